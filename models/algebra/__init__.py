@@ -1,1 +1,1 @@
-"""Exact algebraic numbers: isolated roots, sums of cosines, balls. It imports nothing of graphs."""
+"""Exact algebraic numbers: isolated roots, sums of cosines, balls. Independent of graphs."""

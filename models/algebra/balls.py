@@ -1,4 +1,4 @@
-"""Certified values: balls of Arb around SymPy expressions and algebraic numbers, and their decimals.
+"""Certified values of SymPy expressions and algebraic numbers: balls of Arb, nearest floats, decimals.
 
 Arb: F. Johansson, IEEE Trans. Comput. 66, 1281 (2017).
 """
@@ -18,7 +18,7 @@ Ball: TypeAlias = Any
 """flint.arb if the number is real, flint.acb if it is complex (flint has no types)."""
 
 _MOST = 2**20
-"""Largest working precision in bits of `accurate`; a number that may be zero there is refused."""
+"""Largest working precision in bits of `accurate`; ValueError if a ball of this precision still contains 0."""
 
 
 @contextmanager
@@ -33,18 +33,18 @@ def precision(bits: int) -> Iterator[None]:
 
 
 def enclose(expression: sp.Expr, bits: int) -> Ball:
-    """Return a ball that holds the value of an expression; real arithmetic stays real."""
+    """Return a ball that contains the value of an expression: real (arb) if only real arithmetic occurs."""
     with precision(bits):
         return _ball(expression)
 
 
 def cotangent(turn: fmpq) -> arb:
-    """Return the cotangent of an angle in units of pi, a ball."""
+    """Return a ball around the cotangent of pi * turn."""
     return arb.cos_pi_fmpq(turn) / arb.sin_pi_fmpq(turn)
 
 
 def accurate(ball_at: Callable[[int], Ball], bits: int) -> Ball:
-    """Return a ball of radius below 2**-bits times its modulus."""
+    """Increase the precision of `ball_at` until the ball has a radius below 2**-bits times its modulus."""
     working = bits + 16
     while working < _MOST:
         ball = ball_at(working)
@@ -59,7 +59,7 @@ def accurate(ball_at: Callable[[int], Ball], bits: int) -> Ball:
 def nearest(ball_at: Callable[[int], Ball]) -> float | complex:
     """Return the value as a float, within 0.5001 units in the last place.
 
-    A complex value is as near relative to its modulus.  Raises ValueError as `accurate`.
+    For a complex value the error is relative to the modulus.  Raises ValueError like `accurate`.
     """
     ball = accurate(ball_at, 72)
     if isinstance(ball, arb):
@@ -70,7 +70,7 @@ def nearest(ball_at: Callable[[int], Ball]) -> float | complex:
 def decimals(ball_at: Callable[[int], Ball], digits: int) -> sp.Expr:
     """Return the value as a SymPy Float, within one unit of the last of `digits`.
 
-    A complex value is real + imaginary * I.  Raises ValueError as `accurate`.
+    A complex value is returned as real + imaginary * I.  Raises ValueError like `accurate`.
     """
     bits = int(3.33 * digits) + 12
     ball = accurate(ball_at, bits)
@@ -82,7 +82,7 @@ def decimals(ball_at: Callable[[int], Ball], digits: int) -> sp.Expr:
 
 
 def disjoint(balls: Sequence[Ball]) -> bool:
-    """Return whether no two balls overlap: sorted by their left ends, each meets few others."""
+    """Return whether no two balls overlap; sort by left ends, so that few pairs need a comparison."""
     ordered = sorted((acb(ball) for ball in balls), key=lambda ball: ball.real.lower())
     for i, ball in enumerate(ordered):
         end = ball.real.upper()
@@ -99,13 +99,13 @@ def _decimal(x: Ball, digits: int) -> sp.Float:
 
 
 def _part(part: arb, number: acb, bits: int) -> arb:
-    """Return a real or imaginary part, or 0 if it is smaller than 2**-bits of the modulus."""
+    """Return a real or imaginary part; 0 if the part is smaller than 2**-bits times the modulus."""
     with precision(2 * bits):
         return arb(0) if abs(part).upper() * arb(2) ** (bits - 4) < abs(number).lower() else part.mid()
 
 
 def _ball(e: sp.Expr) -> Ball:
-    """Evaluate an expression at the present precision."""
+    """Evaluate an expression at the current precision of Arb."""
     if e.is_Rational:
         return arb(to_flint(e))
     if e is sp.pi:
@@ -118,7 +118,7 @@ def _ball(e: sp.Expr) -> Ball:
             total = total + _ball(part) if isinstance(e, sp.Add) else total * _ball(part)
         return total
     if isinstance(e, sp.exp):
-        # rational multiples of π go to Arb as rationals, so that π is not rounded
+        # Pass rational multiples of π to Arb as rationals: π is not rounded.
         turn = e.args[0] / (sp.pi * sp.I)
         if turn.is_Rational:
             ratio = to_flint(turn)

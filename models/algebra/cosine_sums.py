@@ -1,8 +1,9 @@
 """Exact arithmetic of sums of cosines of rational angles with rational factors.
 
-Such sums lie in a cyclotomic field: two are equal if the cyclotomic polynomial divides the
-difference, and multiplying all angles of one gives its conjugates (L. C. Washington,
-Introduction to Cyclotomic Fields, Springer, 1997, chapter 2).
+Such sums lie in a cyclotomic field.  Two sums are equal if the cyclotomic polynomial divides their
+difference, written as a polynomial in the root of unity.  Multiplying all angles of a sum by an integer
+prime to the order gives a conjugate (L. C. Washington, Introduction to Cyclotomic Fields, Springer,
+1997, chapter 2).
 """
 
 from __future__ import annotations
@@ -24,24 +25,24 @@ from .lazy import LazyEigenvalues
 from .rationals import to_flint, to_fraction, to_sympy
 
 _HUGE = 10**300
-"""`near` returns infinity for rational numbers above this bound; floats end at 1.8e308."""
+"""`near` returns infinity for rational numbers above this bound; the largest float is 1.8e308."""
 
 
 @dataclass(frozen=True, slots=True)
 class AngleSum:
-    """shift + Σ 2 b cos(2πt) over `terms` (t, b), 0 < t < 1/2, ascending, each t once, no b = 0."""
+    """The number shift + Σ 2 b cos(2πt) over `terms` (t, b), with distinct ascending t, 0 < t < 1/2, and b != 0."""
 
     shift: Fraction
     terms: tuple[tuple[Fraction, Fraction], ...] = ()
 
     @classmethod
     def rational(cls, value: Fraction | int) -> AngleSum:
-        """Return a rational number."""
+        """Make the sum without cosines, a rational number."""
         return cls(Fraction(value))
 
     @classmethod
     def cosine(cls, a: Fraction | int, b: Fraction | int, k: int, m: int) -> AngleSum:
-        """Return a + 2 b cos(2πk/m)."""
+        """Make the sum a + 2 b cos(2πk/m)."""
         return _collected(Fraction(a), [(Fraction(k, m), Fraction(b))])
 
     def __add__(self, other: AngleSum) -> AngleSum:
@@ -50,7 +51,7 @@ class AngleSum:
         return _collected(self.shift + other.shift, [*self.terms, *other.terms])
 
     def __mul__(self, other: AngleSum) -> AngleSum:
-        """2 cos x · 2 cos y = 2 cos(x + y) + 2 cos(x - y)."""
+        """Multiply two sums by the rule 2 cos x · 2 cos y = 2 cos(x + y) + 2 cos(x - y)."""
         parts = [(t, self.shift * b) for t, b in other.terms] + [(t, other.shift * b) for t, b in self.terms]
         for (s, a), (t, b) in product(self.terms, other.terms):
             parts += [(s + t, a * b), (s - t, a * b)]
@@ -61,12 +62,12 @@ class AngleSum:
 
     @property
     def folded(self) -> AngleSum:
-        """The number with all angles in the first quarter turn: one form for -cos x, cos(π - x)."""
+        """The same number with all angles in the first quarter turn, by cos x = -cos(π - x)."""
         return self._turned(lambda t, b: 4 * t > 1)
 
     @property
     def risen(self) -> AngleSum:
-        """The number with all factors positive, as the closed forms of families have them."""
+        """The same number with all factors b positive, the form used by closed forms of families."""
         return self._turned(lambda t, b: b < 0)
 
     def _turned(self, when: Callable[[Fraction, Fraction], bool]) -> AngleSum:
@@ -79,20 +80,20 @@ class AngleSum:
 
     @property
     def near(self) -> float:
-        """The value as a float, within rounding; infinite if it is too large for one."""
+        """The value as a float, within rounding; infinite if the value is too large for a float."""
         if abs(self.shift) > _HUGE:
             return inf if self.shift > 0 else -inf
         return float(self.shift) + sum(2 * float(b) * cos(2 * pi * float(t)) for t, b in self.terms)
 
     @property
     def modulus(self) -> int:
-        """The least m such that all angles are multiples of 2π/m."""
+        """The smallest m such that all angles are multiples of 2π/m."""
         return lcm(*(t.denominator for t, _ in self.terms))
 
     def sign(self) -> int:
-        """Return -1, 0 or 1, decided exactly.
+        """Return the exact sign: -1, 0 or 1.
 
-        Certified balls decide, and the cyclotomic polynomial if they hold 0.
+        Evaluate certified balls; if they contain 0, test the number for 0 with the cyclotomic polynomial.
         """
         number = self.folded
         if not number.terms:
@@ -108,10 +109,10 @@ class AngleSum:
             bits *= 2
 
     def vanishes(self) -> bool:
-        """Return whether the number is 0, decided exactly."""
+        """Return whether the number is exactly 0."""
         if not self.terms:
             return self.shift == 0
-        # write the sum as a polynomial in exp(2πi/m); it is 0 if the cyclotomic polynomial divides it
+        # Write the sum as a polynomial in exp(2πi/m): the sum is 0 if the cyclotomic polynomial divides this one.
         m = self.modulus
         coefficients = [fmpq(0)] * m
         coefficients[0] = to_flint(self.shift)
@@ -124,7 +125,7 @@ class AngleSum:
 
 
 def _collected(shift: Fraction, parts: Iterable[tuple[Fraction, Fraction]]) -> AngleSum:
-    """Add up (t, b) of any angles t: fold them into the first half turn, rational cosines into the shift."""
+    """Make a sum of (t, b) with any t: fold angles into the first half turn, add rational cosines to the shift."""
     turns = list(parts)
     unit = lcm(*(turn.denominator for turn, _ in turns))
     return folded_sum(shift, [(int(turn * unit) % unit, b) for turn, b in turns], unit)
@@ -143,18 +144,18 @@ def folded_sum(shift: Fraction, parts: Iterable[tuple[int, Fraction]], unit: int
 
 
 _RATIONAL = {1: 2, 2: -2, 3: -1, 4: 0, 6: 1}
-"""2 cos(2πt) by the denominator of t, for the t of which it is rational (Niven's theorem)."""
+"""Denominator of t -> 2 cos(2πt), for all t with a rational cosine (Niven's theorem)."""
 
 
 def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]]:
-    """Return equal numbers once, descending, their multiplicities added.
+    """Merge equal numbers and add their multiplicities; return them in descending order.
 
-    Nearly equal numbers are told apart exactly.
+    Nearly equal numbers are compared exactly.
     """
     counts: dict[AngleSum, int] = {}
     for number, times in numbers:
         counts[number] = counts.get(number, 0) + times
-    # floats that differ by more than rounding prove numbers different: collect the others in groups
+    # Numbers differ if their floats differ by more than rounding; collect all others in groups.
     ordered = sorted(counts, key=lambda number: number.near, reverse=True)
     groups: list[list[AngleSum]] = []
     for number in ordered:
@@ -163,7 +164,7 @@ def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]
         else:
             groups.append([number])
     distinct = []
-    # compare the numbers of a group exactly
+    # Compare the numbers of a group exactly.
     for group in groups:
         different: dict[AngleSum, int] = {}
         for number in group:
@@ -174,17 +175,17 @@ def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]
 
 
 def box(sizes: Sequence[int], closed: Sequence[bool]) -> LazyEigenvalues[tuple[sp.Expr, int]]:
-    """Return the spectrum of the Cartesian product of chains and rings: sums of -4 sin² of each.
+    """Return the spectrum of the Cartesian product of chains and rings: sums of -4 sin², one for each direction.
 
-    Directions of one kind and size are taken in one order only.  Only numbers whose floats are too
-    near to each other are compared exactly.
+    `closed[k]` is True if direction k is a ring.  Numbers are compared exactly only if their floats
+    are too close.
     """
-    # one wave (r, how often) for each 2 cos(2πr/unit) of each direction; equal directions in one order only
+    # A wave (r, multiplicity) is one 2 cos(2πr/unit) of a direction.  Equal directions form multisets of waves.
     kinds = Counter(zip(sizes, closed, strict=True))
     unit = lcm(*(size if ring else 2 * size for size, ring in kinds))
     waves = [list(combinations_with_replacement(_waves(*kind, unit), times)) for kind, times in kinds.items()]
 
-    # count how often each multiset of cosines occurs: len! / (repetitions)! orders, times the waves' own counts
+    # Multiplicity of a multiset of waves: number of orders, len!/Π(repetitions)!, times multiplicities of the waves.
     counts: dict[tuple[int, ...], int] = {}
     for choice in product(*waves):
         folded, times = list[int](), 1
@@ -193,7 +194,7 @@ def box(sizes: Sequence[int], closed: Sequence[bool]) -> LazyEigenvalues[tuple[s
             for (r, often), same in Counter(group).items():
                 folded += [r] * same
                 times = times * often**same // factorial(same)
-        # cosines of r and unit/2 - r add up to 0: write all such pairs as (0, unit/2), so equal sums meet early
+        # The cosines of r and unit/2 - r cancel: write such pairs as (0, unit/2), so that equal sums merge early.
         left, paired = sorted(folded), list[int]()
         while left:
             r = left.pop()
@@ -205,7 +206,7 @@ def box(sizes: Sequence[int], closed: Sequence[bool]) -> LazyEigenvalues[tuple[s
         key = tuple(sorted(paired))
         counts[key] = counts.get(key, 0) + times
 
-    # order by floats; compare exactly only within groups of sums that rounding may have swapped
+    # Sort by floats; compare exactly only within groups of sums that rounding may have swapped.
     near = [2 * cos(2 * pi * r / unit) for r in range(unit // 2 + 1)]
     ordered = sorted(((fsum(near[r] for r in key), key) for key in counts), reverse=True)
     shift = -2 * len(sizes)
@@ -215,7 +216,7 @@ def box(sizes: Sequence[int], closed: Sequence[bool]) -> LazyEigenvalues[tuple[s
 
     eigenvalues: list[tuple[tuple[int, ...], int]] = []
     start = 0
-    for end in range(1, len(ordered) + 1):  # the sums of cosines in `near` are within 2 each
+    for end in range(1, len(ordered) + 1):  # a group ends at a gap above rounding
         if end == len(ordered) or ordered[end - 1][0] - ordered[end][0] > 1e-12 * len(sizes):
             eigenvalues += _told_apart([(number(key), key, counts[key]) for _, key in ordered[start:end]])
             start = end
@@ -225,7 +226,7 @@ def box(sizes: Sequence[int], closed: Sequence[bool]) -> LazyEigenvalues[tuple[s
 
 
 def _waves(size: int, ring: bool, unit: int) -> list[tuple[int, int]]:
-    """Return (r, how often) for each 2 cos(2πr/unit) of a chain or ring, 0 <= r <= unit/2."""
+    """Return (r, multiplicity) for each 2 cos(2πr/unit) of a chain or ring, 0 <= r <= unit/2."""
     if ring:
         return [(k * (unit // size), 1 if k in (0, size - k) else 2) for k in range(size // 2 + 1)]
     return [(k * (unit // (2 * size)), 1) for k in range(size)]
@@ -251,7 +252,7 @@ def _told_apart(group: Sequence[tuple[AngleSum, tuple[int, ...], int]]) -> list[
 
 
 def expression(number: AngleSum) -> sp.Expr:
-    """Return the number with short radicals, and -4 b sin² for all other cosines."""
+    """Write the number in SymPy: short radicals where they exist, else multiples of sin²."""
     shift, short, long = number.shift, [], []
     for t, b in number.terms:
         k, m = t.numerator, t.denominator
@@ -264,14 +265,14 @@ def expression(number: AngleSum) -> sp.Expr:
 
 
 def expressions(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[sp.Expr, int]]:
-    """Return numbers with multiplicities as `expression` writes them, equal ones once, descending."""
+    """Merge equal numbers, sort them in descending order and write each with `expression`."""
     return [(expression(number), times) for number, times in merged(numbers)]
 
 
 def read(number: sp.Expr) -> AngleSum | None:
-    """Return a SymPy expression as such a sum.
+    """Convert a SymPy expression to a sum of cosines.
 
-    None if it is none, or has radicals other than those of `cosines.cosine`.
+    Return None for an expression that is no such sum, or has radicals other than those of `cosines.cosine`.
     """
     total = AngleSum.rational(0)
     for part in sp.Add.make_args(number):
@@ -292,7 +293,7 @@ def read(number: sp.Expr) -> AngleSum | None:
 
 @lru_cache(maxsize=1)
 def _atoms() -> dict[sp.Expr, AngleSum]:
-    """Return 1 and the radicals that `cosines.cosine` writes, as sums of cosines."""
+    """Map 1 and the radicals that `cosines.cosine` writes to sums of cosines."""
 
     # √5 = 1 + 4 cos(2π/5), √6 = 2 cos(π/12) + 2 cos(5π/12)
     def c(*turns: tuple[int, int]) -> AngleSum:
@@ -313,11 +314,11 @@ def _atoms() -> dict[sp.Expr, AngleSum]:
 
 
 def minimal_polynomial(number: AngleSum) -> fmpq_poly:
-    """Return the monic irreducible polynomial over the rationals of which the number is a root.
+    """Return the monic minimal polynomial over the rationals.
 
-    The product of (z - conjugate) over all multiples of the angles is a power of it.  Times a
-    common denominator the number is an algebraic integer, so balls around the coefficients of that
-    product give them exactly.
+    Multiply (z - conjugate) over all multiples of the angles; the product is a power of the minimal
+    polynomial.  Scaled by a common denominator, the number is an algebraic integer, so the coefficients
+    of the product are integers, which balls determine exactly.
     """
     if not number.terms:
         return fmpq_poly([-to_flint(number.shift), 1])
@@ -331,7 +332,7 @@ def minimal_polynomial(number: AngleSum) -> fmpq_poly:
         if power is not None:
             break
         bits *= 2
-    # the square-free part, in the variable of the number itself
+    # Take the square-free part and undo the scaling of the variable.
     product = fmpq_poly(power)
     part = product / product.gcd(product.derivative())
     scaled = part(fmpq_poly([0, scale]))
@@ -339,7 +340,7 @@ def minimal_polynomial(number: AngleSum) -> fmpq_poly:
 
 
 def _conjugate(number: AngleSum, unit: int, scale: int) -> Ball:
-    """Return a ball that holds scale times the Galois conjugate with all angles multiplied by `unit`."""
+    """Return a ball around scale times the Galois conjugate whose angles are multiplied by `unit`."""
     total = arb(to_flint(number.shift * scale))
     for t, b in number.terms:
         total += 2 * arb(to_flint(b * scale)) * arb.cos_pi_fmpq(to_flint(2 * unit * t))

@@ -1,7 +1,7 @@
 """Numbers a + 2 b cos(2πk/m) and a + b exp(2πik/m) with rational a and b.
 
-They are written as short real radicals if these exist (m = 1 … 6, 8, 10, 12, 16, 20, 24), otherwise
-as the sine or cosine: the radicals of other angles are long or need complex cube roots (casus
+Numbers are written as short real radicals if such radicals exist (m = 1 … 6, 8, 10, 12, 16, 20, 24),
+otherwise with sine or cosine: the radicals of other angles are long or need complex cube roots (casus
 irreducibilis).
 """
 
@@ -37,7 +37,7 @@ def is_short(k: int, m: int) -> bool:
 
 
 def exponential(shift: int, k: int, m: int) -> sp.Expr:
-    """Return shift + exp(2πik/m), as radicals if m (in lowest terms) is at most 4, or 6."""
+    """Return shift + exp(2πik/m); as radicals if the denominator of k/m is 1, 2, 3, 4 or 6."""
     turn = Fraction(2 * k, m) % 2
     angle = sp.Rational(*(turn - 2 if turn > 1 else turn).as_integer_ratio()) * sp.pi
     if 2 * turn % 1 == 0 or 3 * turn % 1 == 0:
@@ -51,7 +51,7 @@ def minus_four_sine_squared(k: int, m: int) -> sp.Expr:
 
 
 def cosine(a: Fraction, b: Fraction, k: int, m: int) -> sp.Expr:
-    """Return a + 2 b cos(2πk/m): radicals if they are short, a multiple of sin² if a = -2 b."""
+    """Return a + 2 b cos(2πk/m): with short radicals if they exist, else as a multiple of sin² if a = -2 b."""
     k = min(k % m, -k % m)
     k, m = k // gcd(k, m), m // gcd(k, m)
     shift, factor = to_sympy(a), to_sympy(b)
@@ -63,9 +63,9 @@ def cosine(a: Fraction, b: Fraction, k: int, m: int) -> sp.Expr:
 
 
 def linear_cosine(expression: sp.Expr) -> tuple[Fraction, Fraction, int, int] | None:
-    """Return the a, b, k, m of an expression a + 2 b cos(2πk/m), also with sin² or cos².
+    """Return (a, b, k, m) for an expression a + 2 b cos(2πk/m), also one with sin² or cos².
 
-    None for any other expression.
+    Return None for any other expression.
     """
     shift, scaled = expression.as_coeff_Add()
     factor, core = scaled.as_coeff_Mul()
@@ -83,7 +83,7 @@ def linear_cosine(expression: sp.Expr) -> tuple[Fraction, Fraction, int, int] | 
 
 
 def linear_exponential(expression: sp.Expr) -> tuple[Fraction, Fraction, int, int] | None:
-    """Return the a, b, k, m of an expression a + b exp(2πik/m); None for any other."""
+    """Return (a, b, k, m) for an expression a + b exp(2πik/m); None for any other expression."""
     shift, scaled = expression.as_coeff_Add()
     factor, core = scaled.as_coeff_Mul()
     if not (shift.is_Rational and factor.is_Rational and isinstance(core, sp.exp)):
@@ -96,7 +96,7 @@ def linear_exponential(expression: sp.Expr) -> tuple[Fraction, Fraction, int, in
 
 
 def minimal_polynomial(a: Fraction, b: Fraction, m: int, conjugates: fmpz_poly | None = None) -> fmpq_poly:
-    """Return the monic polynomial whose roots are a + 2 b cos(2πk/m) for all k prime to m."""
+    """Return the monic polynomial with the roots a + 2 b cos(2πk/m) for all k prime to m."""
     psi = fmpq_poly(fmpz_poly.cos_minpoly(m) if conjugates is None else conjugates)
     scale = to_flint(b)
     inner = fmpq_poly([-to_flint(a) / scale, 1 / scale])
@@ -104,9 +104,9 @@ def minimal_polynomial(a: Fraction, b: Fraction, m: int, conjugates: fmpz_poly |
 
 
 def exponential_roots(polynomial: fmpq_poly) -> list[sp.Expr] | None:
-    """Return all roots of a monic irreducible polynomial of degree >= 2.
+    """Write all roots of a monic irreducible polynomial of degree >= 2 as a + exp(2πik/m).
 
-    None if they are not of the form a + exp(2πik/m).
+    Return None if the roots do not have this form.
     """
     degree = polynomial.degree()
     for m in _moduli(degree):
@@ -120,14 +120,14 @@ def exponential_roots(polynomial: fmpq_poly) -> list[sp.Expr] | None:
 
 
 def cosine_roots(polynomial: fmpq_poly) -> list[sp.Expr] | None:
-    """Return all roots, descending, of a monic irreducible polynomial of degree >= 2.
+    """Write all roots of a monic irreducible polynomial of degree >= 2 as a + 2 b cos(2πk/m), descending.
 
-    None if they are not of the form a + 2 b cos(2πk/m).  Mean and spread of the roots give a and b
-    for each m of the right degree; an equal polynomial proves it.
+    Return None if the roots do not have this form.  For each m with the right degree compute a and b
+    from the mean and the mean square deviation of the roots; comparing polynomials proves the form.
     """
     degree = polynomial.degree()
     for m in _moduli(2 * degree):
-        # b² is the ratio of the spreads; b < 0 is b > 0 with another m, since -2 cos x = 2 cos(π - x)
+        # b² is the ratio of the deviations.  Only b > 0 is needed: -2 cos x = 2 cos(π - x), with another m.
         (mean, spread), (psi_mean, psi_spread) = _moments(polynomial), _moments(fmpq_poly(fmpz_poly.cos_minpoly(m)))
         square = spread / psi_spread
         top, bottom = isqrt(max(int(square.p), 0)), isqrt(int(square.q))
@@ -141,7 +141,7 @@ def cosine_roots(polynomial: fmpq_poly) -> list[sp.Expr] | None:
 
 
 def _moduli(value: int) -> Iterator[int]:
-    """Return all m >= 3 with φ(m) = value, by a sieve; m < 6 φ(m) holds for all degrees that occur here."""
+    """Yield all m >= 3 with φ(m) = value, by a sieve up to 6 φ(m), a bound for all degrees that occur here."""
     last = 6 * value
     totient = list(range(last + 1))
     for p in range(2, last + 1):
@@ -152,7 +152,7 @@ def _moduli(value: int) -> Iterator[int]:
 
 
 def _moments(polynomial: fmpq_poly) -> tuple[fmpq, fmpq]:
-    """Return mean and mean square deviation of the roots of a monic polynomial."""
+    """Return the mean and the mean square deviation of the roots of a monic polynomial."""
     d = polynomial.degree()
     first, second = polynomial[d - 1], polynomial[d - 2]
     mean = -first / d
@@ -160,7 +160,7 @@ def _moments(polynomial: fmpq_poly) -> tuple[fmpq, fmpq]:
 
 
 def written(factor: fmpq_poly) -> list[sp.Expr] | None:
-    """Return the roots of an irreducible polynomial in closed form; None without a short one."""
+    """Return the roots of an irreducible polynomial in closed form; None if there is no short form."""
     monic = factor / factor[factor.degree()]
     c = [to_sympy(x) for x in monic.coeffs()]
     if len(c) == 2:
@@ -173,11 +173,11 @@ def written(factor: fmpq_poly) -> list[sp.Expr] | None:
 
 
 def biquadratic(monic: fmpq_poly) -> list[sp.Expr] | None:
-    """Return the real nested roots of a quartic; None if it has none.
+    """Write the real roots of a quartic as a ± sqrt(b ± sqrt(c)) or a ± sqrt(b) ± sqrt(c).
 
-    They are a ± sqrt(b ± sqrt(c)), or a ± sqrt(b) ± sqrt(c).
+    Return None if the roots do not have this form.
     """
-    # without its cubic term z⁴ + p z² + q, if the linear term vanishes as well
+    # Shift z to remove the cubic term; the form exists only if z⁴ + p z² + q remains, without linear term.
     shift = monic[3] / 4
     even = monic(fmpq_poly([-shift, 1]))
     p, q, discriminant = even[2], even[0], even[2] ** 2 - 4 * even[0]

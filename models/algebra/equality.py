@@ -1,9 +1,9 @@
-"""Exact comparison of algebraic numbers by a lower bound on differences that are not zero.
+"""Exact comparison of algebraic numbers by a lower bound on non-zero differences.
 
-Every number is written as U/L with algebraic integers U and L; u and l bound all conjugates of U
-and L, and D bounds the degree of the field that holds them.  If U is not 0, its norm is a whole
-number other than 0, so |U| >= u**(1 - D) and the number is at least 1/(l u**(D - 1)) in modulus.
-One certified ball smaller than that decides.
+Write a number as U/L with algebraic integers U and L.  Let u and l bound all conjugates of U and L, and
+let D bound the degree of a field that contains U and L.  If U is not 0, its norm is a non-zero integer,
+so |U| >= u**(1 - D), and the modulus of the number is at least 1/(l u**(D - 1)).  A certified ball
+smaller than this bound decides whether the number is 0.
 
 After Burnikel, Funke, Mehlhorn, Schirra & Schmitt, Algorithmica 55, 14 (2009).
 """
@@ -22,10 +22,10 @@ from .balls import Ball, enclose, precision
 from .roots import Root
 
 Number: TypeAlias = sp.Expr | Root
-"""Rationals, roots, I, sin and cos of rational multiples of pi, exp of those of I*pi, combined."""
+"""Expressions of rationals, roots, I, sin and cos of rational multiples of pi, exp of rational multiples of I*pi."""
 
 MOST_BITS = 2**19
-"""Numbers are refused if their comparison needs more bits than this."""
+"""Largest precision of a comparison in bits; numbers that need more raise an error."""
 
 
 @dataclass(slots=True)
@@ -38,19 +38,19 @@ class _Field:
 
     @property
     def degree(self) -> int:
-        """A bound on the degree of the field."""
+        """An upper bound of the degree of the field."""
         return int(sp.totient(self.unity)) * math.prod(q for _, q in self.radicals) * math.prod(self.roots.values())
 
 
 def equal(a: Number, b: Number) -> bool:
-    """Return whether two algebraic numbers are the same, without any tolerance."""
+    """Return whether two algebraic numbers are exactly equal."""
     if a is b or (isinstance(a, sp.Expr) and isinstance(b, sp.Expr) and a == b):
         return True
     return bool(_compared((a,), (b,)) == 0)
 
 
 def sign(a: tuple[Number, ...], b: tuple[Number, ...]) -> int:
-    """Return the sign of a difference of two products, without any tolerance."""
+    """Return the exact sign of the difference of two products of numbers."""
     gap = _compared(a, b)
     if isinstance(gap, acb) and not gap.imag.contains(0):
         raise ValueError(f"{_shown(a[0])} or {_shown(b[0])} is complex; expected real numbers")
@@ -83,12 +83,12 @@ def _product_ball(factors: tuple[Number, ...], bits: int) -> acb:
 
 
 def check_size(number: sp.Expr) -> None:
-    """Check that a number is simple enough to be compared."""
+    """Raise an error unless a number is simple enough to be compared."""
     _bits(((number,),))
 
 
 def _bits(products: tuple[tuple[Number, ...], ...]) -> int:
-    """Return bits such that a sum or difference of these products is 0 if it is below 2**-bits."""
+    """Compute `bits` such that a sum or difference of these products with modulus below 2**-bits is 0."""
     generated = _Field()
     up, low = _sum([_product([_measure(x, generated) for x in factors]) for factors in products])
     needed = (generated.degree - 1) * up + low
@@ -101,7 +101,7 @@ def _bits(products: tuple[tuple[Number, ...], ...]) -> int:
 
 
 def _product(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Return (log2 u, log2 l) of a product from those of its factors."""
+    """Return (log2 u, log2 l) of a product from the (log2 u, log2 l) of its factors."""
     return sum(up for up, _ in parts), sum(low for _, low in parts)
 
 
@@ -109,7 +109,7 @@ def _measure(x: Number, generated: _Field) -> tuple[float, float]:
     """Return (log2 u, log2 l) of a number, both at least 0; add its generators to the field."""
     if isinstance(x, Root):
         generated.roots[(x.polynomial, x.index)] = len(x.polynomial) - 1
-        leading = x.polynomial[-1]  # times it the root is an algebraic integer; Cauchy bounds its conjugates
+        leading = x.polynomial[-1]  # leading * root is an algebraic integer; Cauchy's bound
         return math.log2(leading + max(map(abs, x.polynomial))), math.log2(leading)
     if x.is_Rational:
         return math.log2(max(abs(int(x.p)), 1)), math.log2(int(x.q))
@@ -133,7 +133,7 @@ def _measure(x: Number, generated: _Field) -> tuple[float, float]:
 
 
 def _sum(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Return (log2 u, log2 l) of a sum: over the common denominator each U meets the L of all others."""
+    """Return (log2 u, log2 l) of a sum; over the common denominator each U is multiplied by the L of all others."""
     low = sum(low for _, low in parts)
     return max(up + low - own_low for up, own_low in parts) + math.log2(len(parts)), low
 
@@ -141,7 +141,7 @@ def _sum(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
 def _unity(turn: sp.Expr, generated: _Field) -> None:
     if not turn.is_Rational:
         raise TypeError(f"{turn} times pi is no rational multiple of pi; expected one, so that the number is algebraic")
-    generated.unity = math.lcm(generated.unity, 4, 2 * int(turn.q))  # 4: sines need I
+    generated.unity = math.lcm(generated.unity, 4, 2 * int(turn.q))  # 4: sines contain I
 
 
 def _power(x: sp.Pow, generated: _Field) -> tuple[float, float]:

@@ -1,11 +1,10 @@
 """Isolation of all roots, real and complex, of an irreducible polynomial.
 
-Aberth's method improves all roots at once, each as if the others were divided out (O. Aberth, Math.
-Comp. 27, 339, 1973).  It starts on the circles that the sizes of the coefficients suggest (D. A.
-Bini, Numer. Algorithms 13, 179, 1996), or on the real axis if Newton's inequalities allow that all
-roots are real.  A proof follows: within d |f/f'| of any point lies a root of f, of degree
-d (D. A. Bini, G. Fiorentino, Numer. Algorithms 23, 127, 2000), and d discs that do not touch hold
-one root each.
+Aberth's method improves all roots at once by Newton steps for f divided by the other factors (O. Aberth,
+Math. Comp. 27, 339, 1973).  Start values lie on circles with radii estimated from the coefficients (D. A.
+Bini, Numer. Algorithms 13, 179, 1996), or on the real axis if Newton's inequalities allow all roots to be
+real.  The proof: for f of degree d, a root of f lies within d |f/f'| of any point (D. A. Bini,
+G. Fiorentino, Numer. Algorithms 23, 127, 2000), so d discs that do not touch contain one root each.
 """
 
 from __future__ import annotations
@@ -21,18 +20,18 @@ from flint import acb, acb_poly, arb, arb_poly, fmpq, fmpz, fmpz_poly
 from .balls import Ball, disjoint, precision
 
 _IDLE = {arb: 30, acb: 200}
-"""Steps of Aberth's method without a newly converged root after which it gives up; in tests 10 and 70 suffice."""
+"""Aberth's method stops after this many steps without a newly converged root; 10 and 70 suffice in tests."""
 _DIGITS = 2.0**-44
 """Relative step size below which a root has converged in floats; Newton's method in balls follows."""
 _SHARP = 160
 """Relative accuracy of the discs in bits."""
 _LARGE = 900.0
-"""Start radii must lie between 2**-900 and 2**900, so that no float overflows."""
+"""Start radii must lie between 2**-_LARGE and 2**_LARGE, so that no float overflows."""
 
 
 @dataclass(frozen=True, slots=True)
 class Disc:
-    """A disc in the complex plane that holds exactly one root; a real centre: the root is real."""
+    """A disc in the complex plane that contains exactly one root; if the centre is real, the root is real."""
 
     x: fmpq
     y: fmpq
@@ -40,20 +39,20 @@ class Disc:
 
     @property
     def ball(self) -> acb:
-        """Return a ball that holds the disc."""
+        """Return a ball that contains the disc."""
         return self.within(1)
 
     def within(self, times: int) -> acb:
-        """Return a ball that holds the disc enlarged by a factor."""
+        """Return a ball that contains the disc enlarged by the factor `times`."""
         return acb(_wide(self.x, times * self.radius), _wide(self.y, times * self.radius))
 
 
 def discs(f: fmpz_poly) -> list[Disc] | None:
-    """Return one disc for each root of a polynomial, real roots first; None if this finds none.
+    """Return one disc for each root of a polynomial, real roots first; None if isolation fails.
 
-    No two discs touch, not even at four times their size.
+    No two discs touch, even if enlarged four times.
     """
-    # values of the polynomial cancel least about the mean of its roots
+    # Shift the origin to the mean of the roots, where evaluating the polynomial cancels least.
     mean = -f[f.degree() - 1] // (f.degree() * f[f.degree()])
     shifted = [(middle, f(fmpz_poly([middle, 1]))) for middle in (mean, fmpz(0))]
     real = all(_may_be_real(g) for _, g in shifted)
@@ -79,7 +78,7 @@ def sharpened(f: fmpz_poly, disc: Disc, room: fmpq, bits: int) -> acb:
 
 
 def sign(f: fmpz_poly, x: fmpq) -> int:
-    """Return the sign of f(x): certified by a ball, or exact if the ball cannot tell."""
+    """Return the sign of f(x), from a ball, or exactly if the ball contains 0."""
     full = f.height_bits() + 2 * f.degree()
     for bits in sorted({min(_usual(f), full), full}):
         with precision(bits + 320):
@@ -97,7 +96,7 @@ def dyadic(ball: arb) -> fmpq:
 
 
 def _usual(f: fmpz_poly) -> int:
-    """Estimate the bits that cancel in a value of f between its roots: four for each root."""
+    """Estimate the bits lost to cancellation when f is evaluated between its roots: four for each root."""
     return 4 * int(f.degree()) + 64
 
 
@@ -106,18 +105,18 @@ def _isolated(f: fmpz_poly, real: bool) -> list[Disc] | None:
     radii = _radii(f)
     if radii is None:
         return None
-    if real:  # starts on both sides of 0, no two of them equal
+    if real:  # distinct starts on both sides of 0
         starts: list[complex] = [r * (1 + 1e-3 * k / len(radii)) * (-1) ** k for k, r in enumerate(radii)]
         isolated = _proved(f, arb, starts)
         if isolated:
             return isolated
-    # starts at equal angles on each circle
+    # Start at equal angles on each circle.
     starts = [cmath.rect(r, 2 * math.pi * k / radii.count(r) + 0.7 + radii.index(r)) for k, r in enumerate(radii)]
     return _proved(f, acb, starts)
 
 
 def _proved(f: fmpz_poly, kind: type, starts: Sequence[complex]) -> list[Disc] | None:
-    """Return discs that do not touch each other, by Aberth's method; None if one is missing."""
+    """Compute all roots by Aberth's method and prove disjoint discs around them; None if the proof fails."""
     value, slope = (arb_poly(p) if kind is arb else acb_poly(p) for p in (f, f.derivative()))
     isolated = []
     for z in _aberth(value, slope, kind, list(starts)) or ():
@@ -127,21 +126,21 @@ def _proved(f: fmpz_poly, kind: type, starts: Sequence[complex]) -> list[Disc] |
         isolated.append(disc)
     if len(isolated) != f.degree() or not disjoint([disc.within(4) for disc in isolated]):
         return None
-    # A disc that meets the real axis holds a real root: its mirror image holds the conjugate root, and no other disc
-    # is near, so both are one root.
+    # A disc that meets the real axis contains a real root: its mirror image contains the conjugate root, and no other
+    # disc is near, so root and conjugate are equal.
     return [
         disc if abs(disc.y) > disc.radius else Disc(disc.x, fmpq(0), disc.radius + abs(disc.y)) for disc in isolated
     ]
 
 
 def _may_be_real(f: fmpz_poly) -> bool:
-    """Test Newton's inequalities, c_k² >= c_(k-1) c_(k+1) (1 + 1/k) (1 + 1/(d - k)): real roots meet them."""
+    """Test Newton's inequalities c_k² >= c_(k-1) c_(k+1) (1 + 1/k) (1 + 1/(d - k)), necessary for real roots only."""
     c, d = f.coeffs(), f.degree()
     return all(c[k] * c[k] * k * (d - k) >= c[k - 1] * c[k + 1] * (k + 1) * (d - k + 1) for k in range(1, d))
 
 
 def _aberth(value: Ball, slope: Ball, kind: type, z: list[complex]) -> list[complex] | None:
-    """Return all roots to about 2**-44 of their moduli; None without convergence or precision."""
+    """Return all roots to about 2**-44 of their moduli; None if the iteration fails or precision is too low."""
     number = float if kind is arb else complex
     moving, idle = list(range(len(z))), 0
     while idle < _IDLE[kind]:
@@ -155,7 +154,7 @@ def _aberth(value: Ball, slope: Ball, kind: type, z: list[complex]) -> list[comp
                 step = newton / (1 - newton * others)
             except (ZeroDivisionError, OverflowError, ValueError):
                 return None
-            # the ball of f/f' must be narrow beside the step, or the step must be negligible
+            # Require a ball of f/f' that is narrow compared with the step, or a negligible step.
             error = float(abs(ball - ball.mid()).upper())
             if not (cmath.isfinite(step) and error <= 2.0**-8 * abs(newton) + _DIGITS * abs(z[k])):
                 return None
@@ -170,15 +169,15 @@ def _aberth(value: Ball, slope: Ball, kind: type, z: list[complex]) -> list[comp
 
 
 def _radii(f: fmpz_poly) -> list[float] | None:
-    """Return the approximate modulus of each root, ascending; None if one is beyond the range of floats."""
-    # log2 |coefficient| over its index; floats hold the leading 60 bits
+    """Estimate the modulus of each root, ascending; None if a modulus exceeds the range of floats."""
+    # Points (k, log2 |c_k|) of the coefficients c_k; take the logarithm from the leading 60 bits.
     points = []
     for k, c in enumerate(f.coeffs()):
         if c != 0:
             shift = max(abs(int(c)).bit_length() - 60, 0)
             points.append((k, math.log2(abs(int(c)) >> shift) + shift))
 
-    # the moduli are the slopes of the upper hull of these points
+    # Slopes of the upper convex hull of the points estimate the moduli.
     hull: list[tuple[int, float]] = []
     for k, y in points:
         while len(hull) > 1 and (hull[-1][1] - hull[-2][1]) * (k - hull[-2][0]) <= (y - hull[-2][1]) * (
@@ -196,7 +195,7 @@ def _radii(f: fmpz_poly) -> list[float] | None:
 
 
 def _sharp(value: Ball, slope: Ball, z: Ball, bits: int) -> Disc | None:
-    """Iterate Newton's method until d |f/f'| is at most 2**-bits of the modulus; None if it fails."""
+    """Iterate Newton's method until d |f/f'| is at most 2**-bits times the modulus; None without convergence."""
     for _ in range(bits.bit_length() + 8):
         step = value(z) / slope(z)
         if not step.is_finite():

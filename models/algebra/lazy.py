@@ -1,4 +1,4 @@
-"""Sequences that compute an item when it is read, for spectra of a million nodes."""
+"""A sequence that computes an item on access, for spectra of graphs with a million nodes."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ T = TypeVar("T", covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class LazyEigenvalues(Sequence[T]):
-    """The distinct real eigenvalues of a graph, the largest first, each computed when it is read.
+    """The distinct real eigenvalues of a graph in descending order, each computed on access.
 
-    A slice is a list of its items.
+    A slice returns a list.
     """
 
     length: int  # number of items

@@ -1,7 +1,7 @@
 """Minimal polynomials of algebraic numbers, and products of (z - number) over sets of conjugates.
 
-Two numbers a + 2 b cos(2πk/m) with b > 0 and one a, b and m (k/m in lowest terms) are conjugate:
-the polynomial of all of them follows without their values.
+Numbers a + 2 b cos(2πk/m) with common a, b > 0 and m (k/m in lowest terms) are conjugate.  Their common
+minimal polynomial follows from a, b and m without numerical values.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ _X = sp.Symbol("x")
 
 
 def multiplied(numbers: Iterable[tuple[AngleSum, int]]) -> fmpq_poly | None:
-    """Return the product of (z - number)^times."""
+    """Return the product of (z - number)^multiplicity; None if a set of conjugates is incomplete."""
     rationals: dict[Fraction, int] = {}
-    # collect the numbers by their sets of conjugates (a, b, m), b > 0: -2b cos(2πt) = 2b cos(2π(1/2 - t))
+    # Group the numbers by sets of conjugates (a, b, m); make b > 0 by -2b cos(2πt) = 2b cos(2π(1/2 - t)).
     classes: dict[tuple[Fraction, Fraction, int], dict[int, int]] = {}
     for number, times in numbers:
         if not number.terms:
@@ -41,7 +41,7 @@ def multiplied(numbers: Iterable[tuple[AngleSum, int]]) -> fmpq_poly | None:
     for value, times in rationals.items():
         product *= fmpq_poly([-value.numerator, value.denominator]) ** times / fmpz(value.denominator) ** times
     for (a, b, m), members in classes.items():
-        # a set of conjugates multiplies to a rational polynomial if it is complete, all equally often
+        # The product over a set is rational if the set is complete, with one multiplicity for all.
         counts = set(members.values())
         if len(counts) != 1 or 2 * len(members) != int(fmpz(m).euler_phi()):
             return None
@@ -55,12 +55,12 @@ def _factor(a: Fraction, b: Fraction, m: int) -> fmpq_poly:
 
 
 def monic(coefficients: Sequence[int]) -> fmpq_poly:
-    """Return the monic polynomial that is proportional to one with whole coefficients, the constant first."""
+    """Make a polynomial with integer coefficients (the constant first) monic."""
     return fmpq_poly(list(coefficients)) / coefficients[-1]
 
 
 def minimal_polynomial(number: sp.Expr | Root) -> fmpq_poly:
-    """Return the monic irreducible polynomial over the rationals of which a number is a root."""
+    """Return the monic minimal polynomial of a number over the rationals."""
     if isinstance(number, Root):
         return monic(number.polynomial)
     if number.is_Rational:

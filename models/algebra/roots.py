@@ -1,9 +1,10 @@
-"""Algebraic numbers: an irreducible integer polynomial and an enclosure of one of its roots.
+"""Algebraic numbers, each given by an irreducible integer polynomial and an enclosure of one root.
 
-A real root lies between two rationals where the polynomial changes sign, a complex root in a disc
-without another root; both are refined to any accuracy.  `isolation.py` isolates the roots, or Arb if
-`isolation.py` fails (F. Johansson, IEEE Trans. Comput. 66, 1281, 2017).  Real roots are refined
-exactly: secant guesses, proved by signs (J. Abbott, ACM Commun. Comput. Algebra 48, 3, 2014).
+The enclosure of a real root is an interval with a change of sign of the polynomial; the enclosure of a
+complex root is a disc without another root.  Both can be refined to any accuracy.  `isolation.py` isolates
+the roots; Arb does if `isolation.py` fails (F. Johansson, IEEE Trans. Comput. 66, 1281, 2017).  Brackets of
+real roots are refined by secant guesses, proved by signs (J. Abbott, ACM Commun. Comput. Algebra 48, 3,
+2014).
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ from .isolation import Disc, discs, dyadic, sharpened, sign
 from .rationals import to_flint, to_fraction
 
 Polynomial = tuple[int, ...]
-"""Integer coefficients, constant first; irreducible and primitive, the leading one positive."""
+"""Integer coefficients, constant first, of an irreducible primitive polynomial; the leading one is positive."""
 
 _X = sp.Symbol("x")
 
 _WRITTEN = 14_000
-"""Longest integer in bits that Python converts to decimals and back by default (4300 digits)."""
+"""Longest integer, in bits, that Python converts to and from decimal text by default (4300 digits)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,23 +38,23 @@ class Root:
     """One root of an irreducible polynomial of degree >= 2."""
 
     polynomial: Polynomial  # integer coefficients, constant first; primitive, the leading one positive
-    # index of the root among SymPy's CRootOf: real roots ascending, then complex ones. The text of the number, and so
-    # tables and JSON, contain it. `complex_order` computes it without SymPy's isolation, which takes minutes where
-    # Aberth's method takes a second
+    # index of SymPy's CRootOf: real roots ascending, then complex roots.  The text of the number, and with it tables
+    # and JSON, contains the index.  `complex_order` computes the index of a complex root without SymPy's isolation,
+    # which takes minutes where Aberth's method takes a second.
     index: int
 
     @property
     def text(self) -> str:
-        """SymPy's text of this number."""
+        """This number as text that SymPy reads: CRootOf(…)."""
         return f"CRootOf({polynomial_text(self.polynomial)}, {self.index})"
 
     @property
     def expression(self) -> sp.Expr:
-        """This number as SymPy's CRootOf, which prints a decimal."""
+        """This number as SymPy's CRootOf, printed as a decimal."""
         return _expression(self)
 
     def enclosure(self, bits: int) -> Ball:
-        """Return a ball that holds this number, of radius below 2**-bits times its modulus."""
+        """Return a ball around this number with a radius below 2**-bits times its modulus."""
         raise NotImplementedError
 
 
@@ -73,7 +74,7 @@ class RealRoot(Root):
             )
 
     def enclosure(self, bits: int) -> arb:
-        """Return a ball that holds this number, of relative radius below 2**-bits."""
+        """Return a ball around this number with a relative radius below 2**-bits."""
         low, high = _refined(self, bits)
         with precision(bits + 16):
             return arb(low).union(arb(high))
@@ -81,22 +82,21 @@ class RealRoot(Root):
 
 @dataclass(frozen=True, slots=True)
 class ComplexRoot(Root):
-    """The only root of `polynomial` within `room` of `near` = (real, imaginary); not real."""
+    """The only root of `polynomial` within the distance `room` of `near` = (real, imaginary); the root is not real."""
 
     near: tuple[Fraction, Fraction]
     room: Fraction
 
     def enclosure(self, bits: int) -> acb:
-        """Return a ball that holds this number, of radius below 2**-bits times its modulus."""
+        """Return a ball around this number with a radius below 2**-bits times its modulus."""
         return _sharpened(self, bits)
 
 
 @lru_cache(maxsize=64)
 def polynomial_text(polynomial: Polynomial) -> str:
-    """Return the polynomial in x as SymPy prints it.
+    """Write the polynomial in x like SymPy.
 
-    If Python refuses to write or read its coefficients, its degree and their size are named
-    instead.
+    If Python refuses to convert a coefficient to text, write the degree and the size of the coefficients.
     """
     longest = max(abs(c).bit_length() for c in polynomial)
     if longest > _WRITTEN:
@@ -105,10 +105,7 @@ def polynomial_text(polynomial: Polynomial) -> str:
 
 
 def coefficient_text(c: int) -> str:
-    """Return a whole number as text for `int(text, 0)`.
-
-    It is hexadecimal if Python refuses to write so many decimals.
-    """
+    """Write an integer as text for `int(text, 0)`, in hexadecimal if Python refuses to write the decimals."""
     return str(c) if abs(c).bit_length() <= _WRITTEN else hex(c)
 
 
@@ -118,7 +115,7 @@ def _short(x: Fraction) -> str:
 
 
 class ComplexRootOf(sp.CRootOf):
-    """SymPy's CRootOf, equal to it, printed as a decimal: polynomials fill pages."""
+    """A CRootOf of SymPy that prints as a decimal, because its polynomial may fill pages; equal to SymPy's own."""
 
     __slots__ = ("shown",)
 
@@ -129,11 +126,11 @@ class ComplexRootOf(sp.CRootOf):
 
     @property
     def precedence(self) -> int:
-        """The precedence of the printed text: that of a sum, -1.5 - 0.9*I."""
+        """Printer precedence of a sum, since the text may be -1.5 - 0.9*I."""
         return int(PRECEDENCE["Add"])
 
     def _sympystr(self, printer: object) -> str:
-        # SymPy creates such roots anew, without their decimal, when it rebuilds an expression.
+        # When SymPy rebuilds an expression, it creates the root anew without its decimal.
         if not hasattr(self, "shown"):
             coefficients = tuple(int(c) for c in self.poly.all_coeffs()[::-1])
             return f"CRootOf({polynomial_text(coefficients)}, {self.index})"
@@ -148,7 +145,7 @@ class ComplexRootOf(sp.CRootOf):
 @lru_cache(maxsize=512)
 def _expression(root: Root) -> sp.Expr:
     root_of = ComplexRootOf(sp.Poly(list(root.polynomial[::-1]), _X), root.index)
-    # SymPy takes a factor out of some polynomials: their root is a number times that of another one.
+    # For some polynomials SymPy returns a number times a root of a rescaled polynomial.
     factor, part = root_of.as_coeff_Mul()
     if isinstance(part, ComplexRootOf):
         value = nearest(root.enclosure) / float(factor)
@@ -165,7 +162,7 @@ def _sharpened(root: ComplexRoot, bits: int) -> acb:
 
 
 def _by_arb(f: fmpz_poly) -> list[Disc]:
-    """Isolate the roots by Arb: a second at degree 100, minutes at degree 200."""
+    """Isolate the roots with Arb, which takes a second at degree 100 and minutes at degree 200."""
     with precision(128):
         balls = [root for root, _ in f.complex_roots()]
         reals = sorted((ball for ball in balls if ball.imag == 0), key=lambda ball: dyadic(ball.real))
@@ -177,7 +174,7 @@ def _by_arb(f: fmpz_poly) -> list[Disc]:
 
 
 def roots(polynomial: Polynomial) -> tuple[Root, ...]:
-    """Return all roots of a polynomial, each isolated by a disc that is proved to hold it alone."""
+    """Return all roots of a polynomial, each with a disc proved to contain no other root."""
     f = fmpz_poly(list(polynomial))
     isolated = discs(f) or _by_arb(f)
     reals = [disc for disc in isolated if disc.y == 0]
@@ -195,31 +192,31 @@ def roots(polynomial: Polynomial) -> tuple[Root, ...]:
 
 
 def _room(disc: Disc, others: list[Disc]) -> fmpq:
-    """Return a distance from the disc within which there is no other root: a quarter of the nearest gap."""
+    """Return a distance within which a disc has no other root: a quarter of the gap to the nearest disc."""
     gaps = (max(abs(disc.x - other.x), abs(disc.y - other.y)) for other in others if other is not disc)
     return max(min(gaps) / 4, disc.radius)
 
 
 @lru_cache(maxsize=4096)
 def _refined(root: RealRoot, bits: int) -> tuple[fmpq, fmpq]:
-    """Narrow the bracket of a real root to 2**-bits of its modulus (Abbott 2014)."""
+    """Narrow the bracket of a real root to 2**-bits times its modulus (Abbott 2014)."""
     f, low, high = fmpz_poly(list(root.polynomial)), to_flint(root.low), to_flint(root.high)
     if low * high > 0 and (high - low) * 2**bits <= min(abs(low), abs(high)):
         return low, high
     at_low, at_high = f(low), f(high)
     pieces = 2**16
     while low * high <= 0 or (high - low) * 2**bits > min(abs(low), abs(high)):
-        # the secant picks one of `pieces` equal parts of the bracket
+        # Divide the bracket into `pieces` equal parts; the secant selects one part.
         step = (high - low) / pieces
         guess = (at_low / (at_low - at_high) * pieces + fmpq(1, 2)).floor()
         end = low + step * min(max(guess, 1), pieces - 1)
         value = f(end)
         other = end + step if value * at_low > 0 else end - step
         at_other = f(other)
-        if value * at_other < 0:  # the part holds the root: square the number of parts
+        if value * at_other < 0:  # right guess: square the number of parts
             (low, at_low), (high, at_high) = sorted([(end, value), (other, at_other)])
             pieces = min(pieces * pieces, 2**bits)
-        else:  # a wrong guess: divide coarser, and bisect
+        else:  # wrong guess: fewer parts, and bisect
             pieces = max(4, isqrt(pieces))
             middle = (low + high) / 2
             value = f(middle)
@@ -231,11 +228,11 @@ def _refined(root: RealRoot, bits: int) -> tuple[fmpq, fmpq]:
 
 
 def complex_order(polynomial: tuple[int, ...], upper: Sequence[acb]) -> list[int]:
-    """Return the positions of the roots above the real axis in SymPy's order."""
+    """Return the rank of each root above the real axis in SymPy's order."""
     if len(upper) < 2:
         return list(range(len(upper)))
     as_sympy = sp.Poly(list(polynomial[::-1]), sp.Symbol("x"))
-    # SymPy may count the roots of a rescaled polynomial
+    # SymPy may order the roots of a rescaled polynomial.
     scale, inner = sp.CRootOf(as_sympy, 0).as_coeff_Mul()
     coefficients = [abs(int(c)) for c in inner.poly.all_coeffs()]
     bound = 2 * max(Fraction(c, coefficients[0]) for c in coefficients)
@@ -249,14 +246,14 @@ def complex_order(polynomial: tuple[int, ...], upper: Sequence[acb]) -> list[int
 def _leaves(
     roots: dict[int, acb], box: tuple[Fraction, Fraction, Fraction, Fraction]
 ) -> list[tuple[tuple[Fraction, Fraction], int]] | None:
-    """Return the lower left corner of the box of each root; None if a root may be on a border."""
+    """Halve the box of all roots until each part has one; return lower left corners, None for a root on a border."""
     corners, boxes = [], [(roots, box)]
     while boxes:
         inside, (left, low, right, top) = boxes.pop()
         if len(inside) == 1:
             corners.append(((left, low), next(iter(inside))))
             continue
-        # halve the longer side
+        # Halve the longer side.
         upright = right - left > top - low
         middle = (left + right) / 2 if upright else (low + top) / 2
         border = arb(to_flint(middle))
@@ -277,7 +274,7 @@ def _leaves(
 
 
 def _ask_sympy(polynomial: sp.Poly, upper: Sequence[acb]) -> list[int]:
-    """Return the same order from SymPy's values: slow, but exact for roots on a border."""
+    """Compute `complex_order` from SymPy's own isolation: slow, but exact for a root on the border of a box."""
     centres = [complex(float(ball.real.mid()), float(ball.imag.mid())) for ball in upper]
     first = polynomial.degree() - 2 * len(upper)
     values = [complex(sp.CRootOf(polynomial, first + 2 * i + 1).evalf(20)) for i in range(len(upper))]

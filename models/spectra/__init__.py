@@ -1,1 +1,1 @@
-"""Exact spectra of matrices: eigenvalues, Jordan blocks, proofs. Knows no family of graphs."""
+"""Exact spectra of rational matrices: eigenvalues, Jordan blocks, proofs. Independent of families of graphs."""

@@ -1,4 +1,4 @@
-"""Spectra as sums of cosines of rational angles: products of graphs and other matrices of a graph add them exactly."""
+"""Write spectra as sums of cosines of rational angles, which can be added and multiplied exactly."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from .matrix import Matrix
 from .solve import spectrum
 
 SMALL = 100
-"""Largest number of rows of a matrix without a closed form whose eigenvalues `angle_sums` computes."""
+"""Most rows of a matrix without a closed form whose eigenvalues `angle_sums` computes."""
 
 
 def angle_sums(matrix: Matrix) -> list[tuple[AngleSum, int]] | None:
-    """Return the eigenvalues of a matrix and their multiplicities as sums of cosines."""
+    """Return (sum of cosines, multiplicity) for all eigenvalues; None if one is no such sum or n is too large."""
     pairs = matrix.closed_form()
     if pairs is None and matrix.n > SMALL:
         return None

@@ -1,11 +1,12 @@
-"""Characteristic polynomials; those of chains, rings and forests need no dense matrix.
+"""Characteristic polynomials det(z - G); chains, rings and forests need no dense matrix.
 
-det(z - G) of a tridiagonal matrix obeys K_j = (z - a_j) K_(j-1) - b_(j-1) c_(j-1) K_(j-2); with
-entries in the two corners it is the trace of the product of the transfer matrices less two products
-(F. R. Gantmacher, M. G. Krein, Oscillation Matrices and Kernels, AMS Chelsea, 2002, chapter II;
-L. G. Molinari, Linear Algebra Appl. 429, 2221, 2008).  Leaves of a forest are eliminated one by one
-(D. P. Jacobs, V. Trevisan, Linear Algebra Appl. 434, 81, 2011).  Factors are multiplied in pairs:
-n = 500 takes milliseconds, the dense matrix of python-flint a second.
+Let a_j be the diagonal entries of a tridiagonal matrix, b_j and c_j the entries beside the diagonal.
+Its leading minors of z - G obey K_j = (z - a_j) K_(j-1) - b_(j-1) c_(j-1) K_(j-2).  With entries in
+the two corners, the polynomial is the trace of the product of the transfer matrices minus the products
+of the entries along both directions of the cycle (F. R. Gantmacher, M. G. Krein, Oscillation Matrices
+and Kernels, AMS Chelsea, 2002, chapter II; L. G. Molinari, Linear Algebra Appl. 429, 2221, 2008).
+Leaves of a forest are eliminated one by one (D. P. Jacobs, V. Trevisan, Linear Algebra Appl. 434, 81,
+2011).  Factors are multiplied pairwise: n = 500 takes milliseconds, python-flint's dense matrix a second.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ Branch: TypeAlias = tuple[Polynomial, Polynomial]
 
 def characteristic(graph: Matrix) -> fmpq_poly:
     """Return the exact characteristic polynomial det(z - G)."""
-    # scale the matrix to whole numbers; the polynomial is scaled back below
+    # Scale the matrix to whole numbers; scale the polynomial back below.
     fractions = graph.entries
     scale = lcm(*(entry.denominator for _, _, entry in fractions))
     entries = {(i, i): 0 for i in range(graph.n)}
@@ -48,24 +49,27 @@ def characteristic(graph: Matrix) -> fmpq_poly:
 
 
 def sparse(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomial]) -> Polynomial | None:
-    """Return the characteristic polynomial of a band or a forest, None of any other matrix."""
+    """Return the characteristic polynomial of a chain, ring or forest; None for any other matrix.
+
+    `polynomial` makes a polynomial of integer coefficients, over the integers or modulo a prime.
+    """
     if banded(n, entries):
         return cyclic(n, entries, polynomial)
     return forest(n, entries, polynomial)
 
 
 def banded(n: int, entries: Entries) -> bool:
-    """Return whether all entries off the diagonal join neighbours of a chain, or its two ends; n >= 3."""
+    """Return whether n >= 3 and all off-diagonal entries join neighbours of a chain, or its two ends."""
     return n >= 3 and all(abs(i - j) in (0, 1, n - 1) for i, j in entries)
 
 
 def cyclic(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomial] = fmpz_poly) -> Polynomial:
-    """Return the characteristic polynomial of a `banded` matrix; arguments as of `sparse`."""
+    """Return the characteristic polynomial of a `banded` matrix; the arguments are those of `sparse`."""
 
     def at(i: int, j: int) -> int:
         return entries.get((i % n, j % n), 0)
 
-    # transfer matrices ((z - a_j, -b_(j-1) c_(j-1)), (1, 0)); the trace of their product, less both cycles
+    # Multiply the transfer matrices ((z - a_j, -b_(j-1) c_(j-1)), (1, 0)); take the trace minus both cycle products.
     one, zero = polynomial([1]), polynomial([0])
     steps: list[Transfer] = [
         (polynomial([-at(j, j), 1]), polynomial([-at(j - 1, j) * at(j, j - 1)]), one, zero) for j in range(n)
@@ -78,9 +82,10 @@ def cyclic(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomia
 def forest(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomial] = fmpz_poly) -> Polynomial | None:
     """Return the characteristic polynomial of a matrix whose links form a forest, else None.
 
-    Arguments are those of `sparse`.  The polynomial of a branch is (z - a) Π P_k - Σ_k b_k Q_k
-    Π_(j != k) P_j over the branches k of its root, P_k their polynomials, Q_k those without their
-    roots and b_k the product of both entries of the link.
+    The arguments are those of `sparse`.  The polynomial of a branch whose root has the diagonal entry a
+    is (z - a) Π_k P_k - Σ_k b_k Q_k Π_(j != k) P_j.  Here k runs over the branches at the root, P_k is
+    the polynomial of branch k, Q_k the polynomial of branch k without the root of k, and b_k the
+    product of the two entries of the link to k.
     """
     order = _parents_first(n, entries)
     if order is None:
@@ -96,7 +101,7 @@ def forest(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomia
 
 
 def _parents_first(n: int, entries: Entries) -> list[tuple[int, int]] | None:
-    """Return the nodes of a forest with their parents (-1 for a root), parents first; None if there is a cycle."""
+    """Return (node, parent) for all nodes of a forest, parents first (-1 for a root); None if there is a cycle."""
     near: list[set[int]] = [set() for _ in range(n)]
     for i, j in entries:
         if i != j:
@@ -126,7 +131,7 @@ def _times(x: Transfer, y: Transfer) -> Transfer:
 
 
 def pairwise_product(factors: Sequence[T], times: Callable[[T, T], T]) -> T:
-    """Return the product of factors in their order; long factors meet near the end only."""
+    """Multiply factors in their order as a balanced tree, so that most products are short."""
     while len(factors) > 1:
         odd = factors[-1:] if len(factors) % 2 else []
         factors = [*(times(a, b) for a, b in zip(factors[::2], factors[1::2], strict=False)), *odd]

@@ -1,13 +1,14 @@
 """Exact eigenvectors of a rational matrix.
 
-An eigenvalue γ with the minimal polynomial p has eigenvectors with entries in Q(γ), which are
-polynomials in γ with rational coefficients.  Let v be a rational vector with p(G) v = 0.  Then
-w = Σ γ^k b_k with b_(d-1) = v and b_(k-1) = G b_k + p_k v is one: (G - γ) w = p(G) v - p(γ) v = 0.
-Vectors v that are independent over Q(γ) give independent w, and all roots of p share the b_k.
+Let γ be an eigenvalue with the minimal polynomial p = Σ p_k z^k of degree d.  Its eigenvectors have
+entries in Q(γ): polynomials in γ with rational coefficients.  Let v be a rational vector with
+p(G) v = 0, b_(d-1) = v and b_(k-1) = G b_k + p_k v.  Then w = Σ γ^k b_k is an eigenvector, because
+(G - γ) w = p(G) v - p(γ) v = 0.  Vectors v independent over Q(γ) give independent eigenvectors, and all
+roots of p share the b_k.
 
-Each w is proved by G b_k = b_(k-1) - p_k b_(d-1), entry by entry; their number by that of the Jordan
-blocks, and that they are independent by the rank of all b_k (F. R. Gantmacher, The Theory of
-Matrices 1, Chelsea, New York, 1959, chapter VII).
+The proof has three parts: G b_k = b_(k-1) - p_k b_(d-1) holds for each w, entry by entry; the number of
+eigenvectors is the number of Jordan blocks; the rank of all b_k shows that the eigenvectors are
+independent (F. R. Gantmacher, The Theory of Matrices 1, Chelsea, New York, 1959, chapter VII).
 """
 
 from __future__ import annotations
@@ -30,10 +31,10 @@ from .matrix import Matrix
 from .solve import spectrum
 
 LARGEST = 100
-"""Most nodes of a graph whose eigenvectors are computed: a few seconds if no eigenvalue is rational."""
+"""Most nodes of a graph whose eigenvectors are computed, which takes a few seconds if no eigenvalue is rational."""
 
 Entry: TypeAlias = tuple[int, ...]
-"""A number of Q(γ): whole coefficients of 1, γ, γ² …, as many as the degree of γ."""
+"""A number of Q(γ): integer coefficients of 1, γ, γ² … γ^(d-1), where d is the degree of γ."""
 
 Vector: TypeAlias = tuple[Entry, ...]
 
@@ -43,7 +44,7 @@ class Eigenspace:
     """All eigenvectors of one eigenvalue."""
 
     eigenvalue: Eigenvalue  # the eigenvalue γ
-    basis: tuple[Vector, ...]  # independent eigenvectors; each entry is the coefficients of 1, γ, γ² …
+    basis: tuple[Vector, ...]  # independent eigenvectors; an entry lists coefficients of 1, γ, γ² …
 
     @property
     def dimension(self) -> int:
@@ -63,7 +64,7 @@ class Eigenspace:
 
     @property
     def values(self) -> tuple[tuple[float | complex, ...], ...]:
-        """The eigenvectors as nearest floats, scaled such that the first of their largest entries is 1."""
+        """The eigenvectors as nearest floats, each divided by its entry of largest modulus (the first of several)."""
         return tuple(tuple(self._floats(vector)) for vector in self.basis)
 
     def _floats(self, vector: Vector) -> Iterator[float | complex]:
@@ -79,7 +80,7 @@ class Eigenspace:
         return abs(accurate(partial(self._ratio, entry, None), 64))
 
     def _ratio(self, entry: Entry, other: Entry | None, bits: int) -> Ball:
-        """Return a ball around the quotient of two numbers of Q(γ), or around the first."""
+        """Return a ball around entry / other; `other` None stands for 1."""
         gamma = self.eigenvalue.enclosure(bits)
         with precision(bits):
             above, below = (
@@ -110,13 +111,13 @@ def eigenspaces(matrix: Matrix) -> tuple[Eigenspace, ...]:
 
 
 def _basis(matrix: Matrix, polynomial: fmpq_poly) -> tuple[Vector, ...]:
-    """Compute the eigenvectors that all roots of a monic irreducible polynomial share."""
+    """Compute eigenvectors as polynomials in γ, valid for every root γ of a monic irreducible polynomial."""
     rational, kernel = _rational(matrix), null_space(value_at(matrix, polynomial))
     degree, independent, basis = int(polynomial.degree()), list[list[fmpq]](), list[Vector]()
     for start in kernel:
         if degree > 1 and fmpq_mat([*independent, start]).rank() == len(independent):
             continue
-        # b_(d-1) = v, b_(k-1) = G b_k + p_k v
+        # b_(d-1) = v, b_(k-1) = G b_k + p_k v: see the head of this module
         parts = [fmpq_mat(matrix.n, 1, start)]
         for k in range(degree - 1, 0, -1):
             parts.append(rational * parts[-1] + parts[0] * polynomial[k])
@@ -135,7 +136,7 @@ def _rational(matrix: Matrix) -> fmpq_mat:
 
 
 def null_space(matrix: fmpz_mat) -> list[list[fmpq]]:
-    """Return a basis of the null space: each vector is 1 at one column without a pivot, 0 at the others."""
+    """Return a basis of the null space: each vector is 1 at one column without pivot, 0 at the other such columns."""
     reduced, below, rank = matrix.rref()
     n, pivots = matrix.ncols(), list[int]()
     for i in range(rank):
@@ -151,7 +152,7 @@ def null_space(matrix: fmpz_mat) -> list[list[fmpq]]:
 
 
 def _whole(columns: Sequence[Sequence[fmpq]]) -> Vector:
-    """Scale columns of coefficients of 1, γ … to coprime integers and return one entry a row."""
+    """Scale the columns b_0, b_1 … together to coprime integers; return the entries of w, one a row."""
     coefficients = [number for column in columns for number in column]
     below = lcm(*(int(number.q) for number in coefficients))
     above = gcd(*(int(number.p) * (below // int(number.q)) for number in coefficients))
@@ -162,7 +163,7 @@ def _whole(columns: Sequence[Sequence[fmpq]]) -> Vector:
 
 
 def check(matrix: Matrix, polynomial: fmpq_poly, basis: Sequence[Vector]) -> None:
-    """Raise ProofError if vectors are no independent eigenvectors of the roots of a monic polynomial."""
+    """Raise ProofError unless the vectors are independent eigenvectors for every root of a monic polynomial."""
     rational, degree = _rational(matrix), int(polynomial.degree())
     for vector in basis:
         image = rational * fmpq_mat([list(map(fmpq, entry)) for entry in vector])
@@ -173,7 +174,7 @@ def check(matrix: Matrix, polynomial: fmpq_poly, basis: Sequence[Vector]) -> Non
                     raise ProofError(
                         f"eigenspaces of {matrix.name}: entry {i} of G v and of γ v differ for the roots γ of {polynomial}"
                     )
-    # independent over Q(γ) if all b_k are independent over the rationals
+    # The vectors are independent over Q(γ) if all b_k are independent over the rationals.
     parts = [[entry[k] for entry in vector] for vector in basis for k in range(degree)]
     if int(fmpz_mat(parts).rank()) != len(parts):
         raise ProofError(f"eigenspaces of {matrix.name}: eigenvectors of the roots of {polynomial} are dependent")

@@ -1,4 +1,4 @@
-"""One exact eigenvalue: its number, its multiplicity, its float and any digits of it."""
+"""One exact eigenvalue: number, multiplicity, nearest float, decimals to any precision."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..algebra.rationals import to_fraction
 from ..algebra.roots import ComplexRoot, RealRoot, Root
 
 NEAR = 1e-12
-"""Relative difference of floats below which numbers are compared exactly."""
+"""Numbers are compared exactly if their floats differ by less than this relative difference."""
 
 Number: TypeAlias = sp.Expr | Root
 
@@ -29,14 +29,14 @@ Blocks: TypeAlias = tuple[tuple[int, int], ...]
 
 
 class ProofError(RuntimeError):
-    """A claimed spectrum is wrong: a mistake of the program or of a topology file."""
+    """A computed or given spectrum is wrong: a mistake of the program or of a topology file."""
 
 
 @dataclass(frozen=True, slots=True)
 class Eigenvalue:
     """An exact number with its algebraic multiplicity."""
 
-    number: Number  # the exact number; a root if it is not written as radicals
+    number: Number  # exact number: an expression, or a Root if there is no short one
     multiplicity: int  # algebraic multiplicity, at least 1
     # sizes of Jordan blocks with their numbers, the largest size first; None if they are not known
     blocks: Blocks | None = field(default=None, compare=False)
@@ -88,7 +88,7 @@ class Eigenvalue:
         return enclose(self.number, bits)
 
     def __eq__(self, other: object) -> bool:
-        """Compare numbers and multiplicities of eigenvalues; of a number the number alone."""
+        """Compare number and multiplicity with another eigenvalue; compare the number alone with a number."""
         if isinstance(other, Eigenvalue):
             return (self.number, self.multiplicity) == (other.number, other.multiplicity)
         if isinstance(other, bool) or not isinstance(other, int | float | complex | Fraction | sp.Expr):
@@ -116,7 +116,7 @@ class Eigenvalue:
         return self._difference(other) >= 0
 
     def _difference(self, other: Eigenvalue | float) -> float:
-        """Return a number with the sign of the difference from another real number; exact where floats cannot decide."""
+        """Return a float with the sign of self - other; for close real numbers the sign is computed exactly."""
         number = other if isinstance(other, Eigenvalue) else _number(other)
         if number is None:
             return float(self) - float(other)
@@ -150,7 +150,7 @@ class Eigenvalue:
 
 
 def _number(value: float | complex | Fraction | sp.Expr) -> Eigenvalue | None:
-    """Return a number as an eigenvalue; None if it is not finite."""
+    """Convert a number to an eigenvalue of multiplicity 1; None if the number is not finite."""
     if isinstance(value, complex):
         real, imaginary = _number(value.real), _number(value.imag)
         return None if real is None or imaginary is None else Eigenvalue(real.number + sp.I * imaginary.number, 1)
@@ -162,11 +162,11 @@ def _number(value: float | complex | Fraction | sp.Expr) -> Eigenvalue | None:
 
 
 def distinct(claims: Sequence[Eigenvalue]) -> bool:
-    """Return True if all eigenvalues are proved distinct, False if two agree to 4000 bits."""
+    """Return True if certified enclosures separate all eigenvalues, False if two agree to 4096 bits."""
     values = [claim.number for claim in claims]
     brackets = sorted((number.low, number.high) for number in values if isinstance(number, RealRoot))
     if len(brackets) == len(values) and all(first[1] <= second[0] for first, second in pairwise(brackets)):
-        return True  # no end is a root
+        return True  # brackets may touch: no end of a bracket is a root
     for bits in (64, 256, 1024, 4096):
         balls = [claim.enclosure(bits) for claim in claims]
         with precision(bits):
@@ -176,9 +176,9 @@ def distinct(claims: Sequence[Eigenvalue]) -> bool:
 
 
 def ordered(claims: Sequence[Eigenvalue]) -> tuple[Eigenvalue, ...]:
-    """Sort eigenvalues from 0 downwards by real part, conjugates side by side.
+    """Sort eigenvalues by decreasing real part, conjugates side by side.
 
-    Certified balls decide if floats cannot.
+    Where floats are too close to decide, compare certified balls.
     """
     if any(isinstance(e.value, complex) for e in claims):
         return tuple(sorted(claims, key=cmp_to_key(_complex_order)))
@@ -190,8 +190,8 @@ def ordered(claims: Sequence[Eigenvalue]) -> tuple[Eigenvalue, ...]:
 
 
 def _complex_order(a: Eigenvalue, b: Eigenvalue) -> int:
-    """Compare by real part, downwards, then |imaginary part|, then lower conjugate first; below 0 if a comes first."""
-    # floats decide if they differ by more than rounding; parts that agree to 1024 bits count as equal
+    """Compare for sorting: decreasing real part, then |imaginary part|, then the lower conjugate first."""
+    # Use floats if they differ by more than rounding; count parts that agree to 1024 bits as equal.
     gap, room = b.value.real - a.value.real, 2.0**-50 * (abs(a.value) + abs(b.value))
     if room < abs(gap) < math.inf:
         return 1 if gap > 0 else -1
@@ -226,7 +226,7 @@ def decimal(value: float | complex) -> str:
 
 
 def entry(e: Eigenvalue) -> str:
-    """Return an eigenvalue in the words of a claims file; decimals without a short exact form."""
+    """Write an eigenvalue as in a claims file: exact if a short form exists, else as a decimal."""
     text = e.text
     if isinstance(e.number, RealRoot):
         text = f"~{rounded(e)}"
@@ -236,7 +236,7 @@ def entry(e: Eigenvalue) -> str:
 
 
 def rounded(e: Eigenvalue, digits: int = 12) -> str:
-    """Return a real eigenvalue rounded to so many digits, each of them right."""
+    """Round a real eigenvalue correctly to `digits` significant digits."""
     value = to_fraction(_midpoint(e, 256))
     with localcontext() as context:
         context.prec = digits
@@ -244,7 +244,7 @@ def rounded(e: Eigenvalue, digits: int = 12) -> str:
 
 
 def words(e: Eigenvalue) -> str:
-    """Return an eigenvalue as a sentence names it."""
+    """Write an eigenvalue for a sentence of a message."""
     if isinstance(e.number, Root):
         value = rounded(e) if isinstance(e.number, RealRoot) else e.evaluate(12)
         return f"{value} (a root of degree {len(e.number.polynomial) - 1})"
@@ -254,5 +254,5 @@ def words(e: Eigenvalue) -> str:
 
 
 def times(count: int) -> str:
-    """Return a multiplicity as a sentence names it."""
+    """Write a multiplicity for a sentence: "once", "3 times"."""
     return "once" if count == 1 else f"{count} times"

@@ -1,7 +1,8 @@
-"""Exact comparison of the coupling strengths at which modes of a network are lost.
+"""Exact comparison of the coupling strengths at which modes of a network become unstable.
 
-A mode with the real eigenvalue gamma reaches the strength alpha at sigma = alpha / |gamma|.
-Certified balls separate two different values; minimal polynomials prove that two are equal.
+A mode with the real eigenvalue gamma reaches the effective strength alpha = sigma |gamma| at the
+coupling strength sigma = alpha / |gamma|.  Certified balls prove two values different; minimal
+polynomials prove two values equal.
 """
 
 from __future__ import annotations
@@ -33,12 +34,12 @@ def compare(alpha: Fraction, gamma: Eigenvalue, other_alpha: Fraction, other_gam
             if scaled < here or scaled > here:
                 return 1 if scaled < here else -1
         if bits == 256:
-            # equal numbers have one minimal polynomial: that of gamma against that of factor * other_gamma
+            # Equal numbers have equal minimal polynomials: compare those of gamma and factor * other_gamma.
             p, q = minimal_polynomial(gamma.number), minimal_polynomial(other_gamma.number)
             ratio = to_flint(alpha / other_alpha)
             polynomial = p if p == q(fmpq_poly([0, 1 / ratio])) * ratio ** q.degree() else None
         if polynomial is not None:
-            # the polynomial is monotone on the ball around both, so both are its only root there
+            # If the polynomial is monotone on the ball around both numbers, both are its only root there.
             with precision(2 * bits + 64):
                 slope = arb_poly(polynomial.derivative())(here.union(scaled))
                 if slope > 0 or slope < 0:

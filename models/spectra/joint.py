@@ -1,9 +1,9 @@
-"""Joint eigenvalues of several matrices that commute, such as those of graphs on the same nodes.
+"""Joint eigenvalues of commuting matrices, such as the connectivity matrices of several graphs on the same nodes.
 
-Matrices that commute are triangular in one basis, so that A + t B has the eigenvalues a + t b of the pairs (a, b) of
-their common modes (R. A. Horn, C. R. Johnson, Matrix Analysis, Cambridge University Press, 2013, theorem 2.3.3).  With a t
-for which no two sums a + t b of eigenvalues of A and B are equal, the exact spectrum of A + t B names the pairs and their
-multiplicities: no eigenvector is computed and nothing is rounded.
+Commuting matrices A and B are triangular in a common basis (R. A. Horn, C. R. Johnson, Matrix Analysis, Cambridge
+University Press, 2013, theorem 2.3.3).  Each common mode has a pair (a, b) of eigenvalues, and A + t B has the
+eigenvalue a + t b there.  Choose t such that all sums a + t b of eigenvalues of A and B differ.  The exact spectrum of
+A + t B then determines the pairs and their multiplicities, without eigenvectors and without rounding.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ BITS = (64, 256, 1024)
 """Precisions in bits at which sums of eigenvalues are separated, tried in this order."""
 
 PRIME, TRIED = 97, 100
-"""Factors t = k/PRIME of a further matrix are tried, k = 1, 2, …; few of them make two sums equal."""
+"""Try factors t = k/PRIME of a further matrix, k = 1 … TRIED; only few of these make two sums equal."""
 
 Modes: TypeAlias = "tuple[tuple[tuple[Eigenvalue, ...], Eigenvalue], ...]"
-"""The eigenvalues of each graph on a common mode, and that of a combination of the graphs."""
+"""For each common mode: the eigenvalue of each graph, and the eigenvalue of the combined matrix."""
 
 
 @dataclass(frozen=True, slots=True)
 class JointEigenvalue:
     """The eigenvalues of several graphs on one common mode."""
 
-    parts: tuple[Eigenvalue, ...]  # the eigenvalue of each graph, with its own multiplicity there
+    parts: tuple[Eigenvalue, ...]  # the eigenvalue of each graph; `multiplicity` in it is that in the graph
     multiplicity: int  # how often these eigenvalues occur together
 
     @property
@@ -83,7 +83,7 @@ class _Combination:
 
     @property
     def diagonalisable(self) -> bool:
-        """True if both are: matrices that commute have a basis of common eigenvectors then."""
+        """True if both matrices are diagonalisable: commuting ones then have a basis of common eigenvectors."""
         return self.first.diagonalisable and self.second.diagonalisable
 
     def closed_form(self) -> None:
@@ -96,22 +96,23 @@ def joint_spectrum(graphs: Sequence[Matrix]) -> tuple[JointEigenvalue, ...]:
     Parameters
     ----------
     graphs : sequence of Matrix
-        Graphs on the same nodes, or other rational matrices of one size; of a single one this is its spectrum.
+        Graphs on the same nodes, or other rational matrices of one size; for one graph the result is its spectrum.
 
     Returns
     -------
     tuple of JointEigenvalue
-        With positive weights downwards; one of them is that of equal states, all zeros.
+        The joint eigenvalues.  One of them is all zeros, the mode of equal states; with positive weights it is the
+        first, and the others follow in decreasing order.
 
     Raises
     ------
     TypeError
-        If they are no sequence.
+        If `graphs` is no sequence.
     ValueError
-        If the graphs have different numbers of nodes, or several of them more than DENSE_LIMIT, and if two of their matrices
-        do not commute.
+        If the graphs have different numbers of nodes, if there are several with more than DENSE_LIMIT nodes, or if two
+        of their matrices do not commute.
     ProofError
-        If the eigenvalues of the sum are no sums of eigenvalues, a mistake of the program.
+        If an eigenvalue of A + t B is no sum a + t b, a mistake of the program.
 
     Examples
     --------
@@ -126,7 +127,7 @@ def joint_spectrum(graphs: Sequence[Matrix]) -> tuple[JointEigenvalue, ...]:
 
 @lru_cache(maxsize=32)
 def _joint(graphs: tuple[Matrix, ...]) -> tuple[JointEigenvalue, ...]:
-    """Compute `joint_spectrum` of a tuple of graphs, which a cache can hold."""
+    """Compute and cache `joint_spectrum` of a tuple of graphs."""
     _check(graphs)
     modes: Modes = tuple(((e,), e) for e in spectrum(graphs[0]))
     combined = graphs[0]
@@ -157,8 +158,8 @@ def _check(graphs: Sequence[Matrix]) -> None:
 
 
 def _joined(modes: Modes, combined: Matrix, graph: Matrix) -> tuple[Modes, Matrix]:
-    """Return the modes with their eigenvalues on one more graph, and the combination A + t B that names them."""
-    # the first t for which the balls around all sums a + t b are disjoint
+    """Add the eigenvalues of one more graph B to the modes of A; return the modes and the matrix A + t B."""
+    # Find the first t for which the balls around all sums a + t b are disjoint.
     eigenvalues = tuple(spectrum(graph))
     pairs = [(parts, e) for parts, _ in modes for e in eigenvalues]
     for bits, k in product(BITS, range(1, TRIED)):
@@ -172,7 +173,7 @@ def _joined(modes: Modes, combined: Matrix, graph: Matrix) -> tuple[Modes, Matri
         raise ProofError(
             f"joint spectrum of {graph.name}({graph.n}): found equal sums for {TRIED} factors; expected one"
         )
-    # each eigenvalue of A + t B lies in the ball around a + t b of exactly one pair (a, b)
+    # Each eigenvalue of A + t B now lies in the ball of exactly one pair (a, b).
     combined = _Combination(combined, graph, factor)
     extended = []
     for number in spectrum(combined):

@@ -1,9 +1,9 @@
-"""Jordan blocks of a rational matrix by exact ranks, with nothing rounded.
+"""Jordan blocks of a rational matrix, from exact ranks.
 
-The nullity of p(G)**k, over the degree of p, is the sum of min(size, k) over the blocks of an
-eigenvalue with the minimal polynomial p (F. R. Gantmacher, The Theory of Matrices 1, Chelsea,
-New York, 1959, chapter VI).  A mode in a block of size s goes as t**(s - 1) exp(λt), λ its exponent
-(T. Nishikawa, A. E. Motter, Phys. Rev. E 73, 065106, 2006).
+Let p be the minimal polynomial of an eigenvalue.  The nullity of p(G)**k, divided by the degree of p,
+is the sum of min(size, k) over the Jordan blocks of the eigenvalue (F. R. Gantmacher, The Theory of
+Matrices 1, Chelsea, New York, 1959, chapter VI).  A mode with exponent λ in a block of size s grows as
+t**(s - 1) exp(λt) (T. Nishikawa, A. E. Motter, Phys. Rev. E 73, 065106, 2006).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .matrix import Matrix
 
 
 def blocks(graph: Matrix, polynomial: fmpq_poly, multiplicity: int) -> Blocks:
-    """Return the Jordan blocks that every root of a factor of the characteristic polynomial has."""
+    """Return the Jordan blocks of each root of an irreducible factor; all roots have the same blocks."""
     if multiplicity == 1 or graph.diagonalisable:
         return ((1, multiplicity),)
     first = power = value_at(graph, polynomial)
@@ -31,7 +31,7 @@ def blocks(graph: Matrix, polynomial: fmpq_poly, multiplicity: int) -> Blocks:
             raise RuntimeError(
                 f"{graph.name}: blocks of {polynomial} end at {sums[-1]} of {multiplicity}; it is no factor"
             )
-        if longer[-1] == 1:  # the last block takes what is left
+        if longer[-1] == 1:  # one block remains: its size follows from the multiplicity
             size = len(sums) - 1 + multiplicity - sums[-1]
             longer += [1] * (size - len(sums) + 1)
             break
@@ -42,13 +42,13 @@ def blocks(graph: Matrix, polynomial: fmpq_poly, multiplicity: int) -> Blocks:
 
 
 def nullity(graph: Matrix, polynomial: fmpq_poly) -> int:
-    """Return the dimension of the null space of p(G), p a polynomial with rational coefficients."""
+    """Return the dimension of the null space of p(G) for a rational polynomial p."""
     return graph.n - int(value_at(graph, polynomial).rank())
 
 
 @lru_cache(maxsize=4)
 def _whole(graph: Matrix) -> tuple[fmpz_mat, int]:
-    """Return G times the common denominator of its entries, and that denominator."""
+    """Return (G times d, d), where d is the common denominator of the entries."""
     scale = lcm(*(number.denominator for _, _, number in graph.entries))
     scaled = fmpz_mat(graph.n, graph.n)
     for i, j, number in graph.entries:
@@ -57,7 +57,7 @@ def _whole(graph: Matrix) -> tuple[fmpz_mat, int]:
 
 
 def value_at(graph: Matrix, polynomial: fmpq_poly) -> fmpz_mat:
-    """Return a multiple of p(G) with whole entries, p a polynomial with rational coefficients."""
+    """Return an integer multiple of p(G) with integer entries, for a rational polynomial p."""
     g, scale = _whole(graph)
     coefficients = polynomial.numer()
     d, n = coefficients.degree(), graph.n
@@ -72,7 +72,7 @@ def value_at(graph: Matrix, polynomial: fmpq_poly) -> fmpz_mat:
 def geometric_multiplicity(graph: Matrix, eigenvalue: Eigenvalue) -> int:
     """Return the number of independent eigenvectors of an eigenvalue of a graph, by an exact rank.
 
-    All roots of the minimal polynomial p share it: the nullity of p(G) over the degree of p.
+    The number is the nullity of p(G) divided by the degree of p, the minimal polynomial of the eigenvalue.
     """
     if eigenvalue.multiplicity == 1 or graph.diagonalisable:
         return eigenvalue.multiplicity

@@ -1,4 +1,4 @@
-"""What `spectrum` needs of a matrix; graphs and other matrices of graphs offer it."""
+"""The protocol `Matrix`, the input of `spectrum`: graphs and `GraphMatrix` implement it."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
 
 
 class Matrix(Hashable, Protocol):
-    """A square rational matrix, as its entries other than 0."""
+    """A square rational matrix, given by its non-zero entries."""
 
     @property
     def name(self) -> str:
-        """What messages call the matrix."""
+        """Name of the matrix in messages."""
 
     @property
     def n(self) -> int:
@@ -23,11 +23,11 @@ class Matrix(Hashable, Protocol):
 
     @property
     def options(self) -> tuple[tuple[str, object], ...]:
-        """What distinguishes matrices of one name and size."""
+        """Options that distinguish matrices of the same name and size."""
 
     @property
     def entries(self) -> tuple[tuple[int, int, Fraction], ...]:
-        """The entries other than 0 as (row, column, entry), each once."""
+        """The non-zero entries as (row, column, entry), each once."""
 
     @property
     def link_count(self) -> int:
@@ -35,7 +35,7 @@ class Matrix(Hashable, Protocol):
 
     @property
     def diagonalisable(self) -> bool:
-        """True if it is known that eigenvectors are a basis, as those of a symmetric matrix are."""
+        """True if eigenvectors are known to form a basis, as for a symmetric matrix."""
 
     def closed_form(self) -> Sequence[tuple[sp.Expr, int]] | None:
-        """List the eigenvalues with multiplicities, each once; None without a closed form."""
+        """List the distinct eigenvalues with multiplicities; None without a closed form."""

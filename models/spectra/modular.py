@@ -1,10 +1,10 @@
-"""The check of large graphs: a closed form modulo large primes.
+"""Check the closed form of a large graph modulo large primes.
 
-Modulo a prime p = 1 mod m there is a root of unity ζ of order m among the whole numbers.  There
-2 cos(2πk/m) is ζ^k + ζ^-k, so that the check needs no cyclotomic algebra.  A polynomial over the
-cyclotomic field that is not zero is zero modulo few primes only (L. C. Washington, Introduction to
-Cyclotomic Fields, Springer, 1997, chapter 2): the norm of one of its coefficients, which is bounded
-by the eigenvalues, has few large divisors.
+Modulo a prime p = 1 mod m the integers contain a root of unity ζ of order m.  There 2 cos(2πk/m)
+equals ζ^k + ζ^-k, so that the check needs no cyclotomic algebra.  A non-zero polynomial over the
+cyclotomic field is zero modulo few primes only (L. C. Washington, Introduction to Cyclotomic Fields,
+Springer, 1997, chapter 2): such a prime divides the norm of a coefficient, and the norm, bounded by
+the eigenvalues, has few large prime divisors.
 """
 
 from __future__ import annotations
@@ -26,22 +26,23 @@ from .eigenvalue import ProofError
 from .matrix import Matrix
 
 PRIMES = 3
-"""Number of primes that `check_modulo` takes."""
+"""Number of primes with which `check_modulo` compares."""
 
 BITS = 61
 """The primes lie between 2**BITS and 2**(BITS + 1), so that residues fit into 64 bits."""
 
 LONGEST = 10_000
-"""Largest number of roots of unity to which `_surd` expands a square root."""
+"""Most roots of unity into which `_surd` expands a square root."""
 
 Powers = tuple[Fraction, tuple[tuple[Fraction, Fraction], ...]]
-"""shift + Σ b exp(2πit) as (shift, ((t, b), …))."""
+"""The number shift + Σ b exp(2πit), stored as (shift, ((t, b), …))."""
 
 
 def check_modulo(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]]) -> float | None:
     """Compare a closed form with the characteristic polynomial modulo PRIMES primes.
 
-    A hash of the closed form picks the primes.
+    Return the probability of missing a difference; None if a number is no sum of roots of unity.  A hash
+    of the closed form selects the primes.
     """
     all_powers = [(_powers(sp.sympify(number)), times) for number, times in pairs]
     claims = [(powers, times) for powers, times in all_powers if powers is not None]
@@ -60,7 +61,7 @@ def check_modulo(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]]) -> float |
 
 
 def _powers(number: sp.Expr) -> Powers | None:
-    """Return a number as a sum of roots of unity; None if it has no such form here."""
+    """Write a number as a sum of roots of unity; None if no such form is recognised."""
     form = cosines.linear_exponential(number)
     if form is not None:
         a, b, k, m = form
@@ -81,7 +82,10 @@ def _powers(number: sp.Expr) -> Powers | None:
 
 
 def _surd(number: sp.Expr) -> Powers | None:
-    """Expand a + b √c, c = 1 mod 4, by Gauss: Σ exp(2πik²/c) = √c (Washington 1997, chapter 6); else None."""
+    """Expand a + b √c with c = 1 mod 4 by the Gauss sum √c = Σ_k exp(2πik²/c); None for any other number.
+
+    See Washington 1997, chapter 6.
+    """
     a, scaled_root = number.as_coeff_Add()
     b, root = scaled_root.as_coeff_Mul()
     if not (a.is_Rational and b.is_Rational and root.is_Pow and root.exp == sp.S.Half and root.base.is_Integer):
@@ -106,7 +110,7 @@ def _primes(m: int, seed: str) -> Iterator[int]:
 
 
 def _unit(m: int, p: int) -> int:
-    """Return a root of unity of order m modulo p: no power m/q of it, q a prime factor of m, is 1."""
+    """Find z of order m modulo p: z^(m/q) is not 1 for every prime factor q of m."""
     prime_factors = [int(q) for q, _ in fmpz(m).factor()]
     candidates = (pow(g, (p - 1) // m, p) for g in range(2, p))
     return next(z for z in candidates if all(pow(z, m // q, p) != 1 for q in prime_factors))
@@ -117,7 +121,7 @@ def _residue(x: Fraction, p: int) -> int:
 
 
 def _claimed(claims: Sequence[tuple[Powers, int]], m: int, p: int) -> nmod_poly:
-    """Return the product of (z - number)^times modulo p."""
+    """Return the product of (z - number)^multiplicity over all claims, modulo p."""
     unit = _unit(m, p)
     factors = []
     for (shift, terms), times in claims:
@@ -128,7 +132,7 @@ def _claimed(claims: Sequence[tuple[Powers, int]], m: int, p: int) -> nmod_poly:
 
 def _characteristic(graph: Matrix, p: int) -> nmod_poly:
     """Return det(z - G) modulo p."""
-    # weights repeat: convert each only once
+    # Convert each distinct weight only once.
     residues: dict[Fraction, int] = {}
     entries = {(i, i): 0 for i in range(graph.n)}
     for row, column, number in graph.entries:
@@ -146,8 +150,8 @@ def _characteristic(graph: Matrix, p: int) -> nmod_poly:
 
 
 def _error_probability(graph: Matrix, claims: Sequence[tuple[Powers, int]], m: int) -> float:
-    """Estimate the largest share of primes that divide the norm of a coefficient of the difference."""
-    # bound the coefficients by the largest eigenvalue: row sums of G, and the claimed numbers themselves
+    """Estimate the largest share of primes modulo which two different polynomials agree."""
+    # Bound the coefficients by the largest eigenvalue: by row sums of |G|, and by the claimed numbers.
     parts = [x for (a, terms), _ in claims for x in (a, *(b for _, b in terms))]
     scale = lcm(*{x.denominator for x in (*parts, *(w for _, _, w in graph.entries))})
     rows = [0.0] * graph.n
@@ -156,5 +160,5 @@ def _error_probability(graph: Matrix, claims: Sequence[tuple[Powers, int]], m: i
     largest = max(*rows, *(float(abs(a) + sum(abs(b) for _, b in c)) for (a, c), _ in claims))
     units = int(fmpz(m).euler_phi())
     bad = units * (graph.n * log2(1 + scale * largest) + 1) / BITS
-    # There are about 2**BITS / (units * log of one) primes.
+    # About 2**BITS / (units * log(prime)) primes of this size are 1 mod m.
     return bad * units * (BITS + 1) * log(2.0) / 2.0**BITS

@@ -1,13 +1,13 @@
 """Exact eigenvalues of a rational matrix, proved by its characteristic polynomial.
 
-The closed form is used if the family or operation that made the graph has one.  The eigenvalues of
-any other rational matrix are the roots of the irreducible factors of its exact characteristic
-polynomial (python-flint), written as rationals, short real radicals, cosines of rational angles, or
-real and complex algebraic numbers.
+A graph may have a closed form of its spectrum from its family or operation.  The eigenvalues of any
+other rational matrix are the roots of the irreducible factors of its exact characteristic polynomial
+(python-flint), written as rationals, short real radicals, cosines of rational angles, or real and
+complex algebraic numbers.
 
-The proof multiplies the product of (z - eigenvalue) out.  Each claimed number has an exact minimal
-polynomial.  If the claims that share one are as many distinct numbers as its degree, with one
-multiplicity, their factors multiply to that polynomial: no two floats are ever compared.
+The proof computes the product of (z - eigenvalue) exactly.  Group the claimed numbers by their exact
+minimal polynomials p.  If a group has deg p distinct numbers, all of one multiplicity m, the product of
+its factors is p**m.  No floats are compared.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ from .modular import check_modulo
 from .spectrum import Spectrum
 
 DENSE_LIMIT = 1000
-"""Largest number of rows of a matrix without a closed form; exact factors of larger ones take too long."""
+"""Most rows of a matrix without a closed form; exact factorisation of larger matrices takes too long."""
 
 
 class Proof(StrEnum):
-    """How a closed form is compared with the characteristic polynomial of its graph."""
+    """Method by which a closed form is compared with the characteristic polynomial of its graph."""
 
     EXACT = "exact"
-    """Multiplied out over the rationals."""
+    """Multiply the closed form out over the rationals."""
     MODULAR = "modular"
-    """Multiplied out modulo three large primes (1000 nodes: seconds)."""
+    """Multiply the closed form out modulo three large primes (seconds for 1000 nodes)."""
     NONE = "none"
 
     @classmethod
     def of_size(cls, n: int, exact: int = 200, modular: int = 400) -> Proof:
-        """Return the proof for n nodes: EXACT and MODULAR up to these sizes, else NONE."""
+        """Return the proof for n nodes: EXACT up to `exact` nodes, MODULAR up to `modular` nodes, else NONE."""
         return cls.EXACT if n <= exact else cls.MODULAR if n <= modular else cls.NONE
 
 
@@ -68,12 +68,12 @@ def spectrum(graph: Matrix, proof: Proof | None = None) -> Spectrum:
 
 
 def has_closed_form(graph: Matrix) -> bool:
-    """Return whether the eigenvalues of a graph are known without its characteristic polynomial."""
+    """Return whether a graph has a closed form of its eigenvalues."""
     return graph.closed_form() is not None
 
 
 def _by_factors(graph: Matrix) -> Spectrum:
-    """Compute the roots of the irreducible factors of the characteristic polynomial."""
+    """Compute the spectrum from the irreducible factors of the characteristic polynomial."""
     if graph.n > DENSE_LIMIT:
         raise ValueError(
             f"topology {graph.name}: n = {graph.n} without a closed form; expected at most {DENSE_LIMIT} "
@@ -89,7 +89,7 @@ def _by_factors(graph: Matrix) -> Spectrum:
 
 
 def _unverified(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]], error_probability: float | None) -> Spectrum:
-    """Return the spectrum of a closed form that is not multiplied out over the rationals."""
+    """Make a spectrum of a closed form without the exact proof."""
     if isinstance(pairs, LazyEigenvalues):
         lazy = LazyEigenvalues(len(pairs), pairs.n, lambda k: _candidate(pairs[k], True))
         return Spectrum(lazy, error_probability=error_probability)
@@ -99,12 +99,12 @@ def _unverified(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]], error_proba
 
 
 def _candidate(pair: tuple[sp.Expr, int], simple: bool) -> Eigenvalue:
-    """Return an eigenvalue of a closed form; its Jordan blocks have size 1 if `simple`, else they are not computed."""
+    """Make an eigenvalue of a closed form; its Jordan blocks have size 1 if `simple`, else they are unknown."""
     return Eigenvalue(sp.sympify(pair[0]), pair[1], ((1, pair[1]),) if simple else None)
 
 
 def _with_blocks(graph: Matrix, pair: tuple[sp.Expr, int]) -> Eigenvalue:
-    """Return an eigenvalue of a closed form with its Jordan blocks."""
+    """Make an eigenvalue of a closed form and compute its Jordan blocks."""
     number, count = sp.sympify(pair[0]), pair[1]
     if count == 1 or graph.diagonalisable:
         return _candidate(pair, graph.diagonalisable)
@@ -118,8 +118,8 @@ def _proved(graph: Matrix, claims: Sequence[Eigenvalue], polynomial: fmpq_poly) 
 
 
 def check(claims: Iterable[Eigenvalue], characteristic: fmpq_poly, name: str) -> None:
-    """Multiply eigenvalues out; ProofError if that is not the exact characteristic polynomial."""
-    # collect the eigenvalues by their minimal polynomials: each group must be all its roots, equally often
+    """Raise ProofError unless the product of (z - eigenvalue) is the exact characteristic polynomial."""
+    # Group the eigenvalues by minimal polynomial: each group must contain all roots, with one multiplicity.
     groups: dict[tuple[int, ...], list[Eigenvalue]] = {}
     for claim in claims:
         groups.setdefault(_key(claim.number), []).append(claim)
@@ -143,7 +143,7 @@ def check(claims: Iterable[Eigenvalue], characteristic: fmpq_poly, name: str) ->
 
 
 def _key(number: Number) -> tuple[int, ...]:
-    """Return the minimal polynomial with coprime integer coefficients, the leading one positive."""
+    """Return the minimal polynomial as coprime integer coefficients, the leading coefficient positive."""
     if isinstance(number, Root):
         return number.polynomial
     return tuple(int(c) for c in minimal_polynomial(number).numer().coeffs())

@@ -1,4 +1,4 @@
-"""The spectrum of a matrix, and its table of text."""
+"""The spectrum of a matrix, and its table as text."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from ..inputs.display import HasLatex, HasPlot
 from .eigenvalue import Eigenvalue, decimal
 
 SHOWN = 24
-"""The text of a spectrum leaves out the middle of more eigenvalues than this."""
+"""Most eigenvalues in the text of a spectrum; of more, the text leaves out the middle."""
 
 
 @dataclass(frozen=True, slots=True)
 class Spectrum(HasLatex, HasPlot):
-    """The distinct eigenvalues downwards by real part (of G from 0), conjugates side by side.
+    """The distinct eigenvalues by decreasing real part, conjugates side by side.
 
     Parameters
     ----------
     eigenvalues : sequence of Eigenvalue
-        A tuple; of large chains and rings a lazy sequence that makes its items one by one.
+        A tuple; for large chains and rings a lazy sequence that computes an item when it is read.
     verified : bool, optional
-        True if the product of (z - γ)^multiplicity was multiplied out and is the exact
-        characteristic polynomial; False for the closed form of a large graph.
+        True if the product of (z - γ)^multiplicity was proved equal to the exact characteristic
+        polynomial; False for the closed form of a large graph.
     error_probability : float, optional
-        Set if the two polynomials are equal modulo large primes: about the probability that this
-        misses a difference.
+        If the two polynomials were compared modulo large primes: the approximate probability that
+        the comparison missed a difference.
     """
 
     eigenvalues: Sequence[Eigenvalue]
@@ -51,7 +51,7 @@ class Spectrum(HasLatex, HasPlot):
 
     @property
     def n(self) -> int:
-        """Number of eigenvalues, each counted as often as it occurs."""
+        """Number of eigenvalues, counted with multiplicity."""
         if isinstance(self.eigenvalues, LazyEigenvalues):
             return self.eigenvalues.n
         return sum(self.multiplicities)
@@ -91,7 +91,7 @@ class Spectrum(HasLatex, HasPlot):
 
     @property
     def defective(self) -> tuple[Eigenvalue, ...]:
-        """The eigenvalues that are known to have fewer eigenvectors than their multiplicity."""
+        """The eigenvalues known to have fewer independent eigenvectors than their multiplicity."""
         if isinstance(self.eigenvalues, LazyEigenvalues):
             return ()
         return tuple(e for e in self.eigenvalues if e.defective)
@@ -100,7 +100,7 @@ class Spectrum(HasLatex, HasPlot):
     def zeros(self) -> int:
         """The multiplicity of 0."""
         if isinstance(self.eigenvalues, LazyEigenvalues):
-            first: Eigenvalue = self.eigenvalues[0]  # 0 is the first
+            first: Eigenvalue = self.eigenvalues[0]  # 0 is the largest
             return first.multiplicity
         return sum(e.multiplicity for e in self.eigenvalues if e.number is sp.S.Zero)
 
@@ -113,7 +113,7 @@ class Spectrum(HasLatex, HasPlot):
 
     @property
     def slowest(self) -> sp.Expr:
-        """The eigenvalue other than 0 of smallest modulus, the first of several; or ValueError."""
+        """The non-zero eigenvalue of smallest modulus, the first of several; ValueError if all are 0."""
         lazy = isinstance(self.eigenvalues, LazyEigenvalues)
         others = self.eigenvalues[1:2] if lazy else self.nonzero
         if not others:
@@ -127,7 +127,7 @@ class Spectrum(HasLatex, HasPlot):
     def as_dict(self) -> dict[str, object]:
         """Return what `synchain spectrum --json` prints; a complex value is [real, imaginary].
 
-        Each polynomial is written once; its roots have its number and their index as CRootOf.
+        Each polynomial is written once.  A root refers to its polynomial by number, and has the index of CRootOf.
         """
         polynomial_index: dict[tuple[int, ...], int] = {}
         listed = []
@@ -157,7 +157,7 @@ class Spectrum(HasLatex, HasPlot):
         }
 
     def text(self, limit: int) -> str:
-        """Return text such as {0: 1, -2: 3}, without the middle of more than `limit` eigenvalues."""
+        """Return text such as {0: 1, -2: 3}; of more than `limit` eigenvalues leave out the middle."""
         many = len(self) > limit
         shown = [f"{e}: {e.multiplicity}" for e in (self.eigenvalues[: limit - 1] if many else self.eigenvalues)]
         last = [f"… ({len(self) - limit} more)", f"{self[-1]}: {self[-1].multiplicity}"] if many else []
@@ -168,10 +168,10 @@ class Spectrum(HasLatex, HasPlot):
 
 
 def _farthest(eigenvalues: Sequence[Eigenvalue], way: int) -> sp.Expr:
-    """Return the first eigenvalue of largest modulus to 1024 bits; of smallest if `way` is -1."""
+    """Return the first eigenvalue of largest modulus (smallest if `way` is -1), compared to 1024 bits."""
     top = max(way * abs(e.value) for e in eigenvalues)
     bound = top - 1e-12 * abs(top)
-    best, bits = [e for e in eigenvalues if not way * abs(e.value) < bound], 64  # all if infinite
+    best, bits = [e for e in eigenvalues if not way * abs(e.value) < bound], 64  # all, if floats overflow
     while len(best) > 1 and bits <= 1024:
         with precision(bits + 64):
             sizes = [way * abs(e.enclosure(bits)) for e in best]
@@ -182,7 +182,7 @@ def _farthest(eigenvalues: Sequence[Eigenvalue], way: int) -> sp.Expr:
 
 
 def table(spectrum: Spectrum, limit: int | None = None) -> str:
-    """Return a spectrum as a table of text; long polynomials are cut short."""
+    """Write a spectrum as a table; long polynomials are abbreviated."""
     head = ("exact", "decimal", "multiplicity")
     many = limit is not None and len(spectrum) > limit
     half = (limit or 0) // 2
@@ -208,7 +208,7 @@ def table(spectrum: Spectrum, limit: int | None = None) -> str:
 
 
 def _blocks(e: Eigenvalue) -> str:
-    """Return sizes of Jordan blocks as text, such as 3, 1 (2 times)."""
+    """Write the sizes of Jordan blocks, such as "3, 1 (2 times)"."""
     if e.blocks is None:
         return "not computed"
     return ", ".join(f"{size}" if times == 1 else f"{size} ({times} times)" for size, times in e.blocks)

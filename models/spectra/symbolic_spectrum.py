@@ -1,4 +1,4 @@
-"""Spectra of matrices of rational functions: characteristic polynomial, factors, and roots where it factors.
+"""Spectra of matrices of rational functions: characteristic polynomial, irreducible factors, roots up to degree 2.
 
 All results hold for generic symbols; for particular numbers eigenvalues may coincide.
 """
@@ -14,7 +14,7 @@ from sympy.polys.matrices import DomainMatrix
 from .eigenvalue import ProofError
 
 Z = sp.Symbol("z")
-"""The variable of characteristic polynomials; no weight may be called so."""
+"""The variable of characteristic polynomials; no weight may have this name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class SymbolicSpectrum:
 
     @property
     def eigenvalues(self) -> tuple[tuple[sp.Expr, int], ...]:
-        """(root, multiplicity) of every factor of degree 1 or 2."""
+        """(root, multiplicity) for the roots of all factors of degree 1 and 2."""
         return tuple((root, count) for factor, count in self.factors for root in _roots(factor))
 
     @property
@@ -36,7 +36,7 @@ class SymbolicSpectrum:
 
     @property
     def text(self) -> str:
-        """The spectrum as lines."""
+        """The spectrum as lines of text."""
         rows = [f"characteristic polynomial: {sp.sstr(_product(self.factors))}"]
         rows += [f"  {sp.sstr(root)}{_often(count)}" for root, count in self.eigenvalues]
         rows += [f"  the roots of {sp.sstr(f.as_expr())}{_often(count)}" for f, count in self.unsolved]
@@ -53,7 +53,7 @@ class SymbolicSpectrum:
 
 
 def symbolic_spectrum(matrix: sp.ImmutableDenseMatrix, name: str) -> SymbolicSpectrum:
-    """Return the characteristic polynomial of a matrix of rational functions, factored."""
+    """Compute and factor the characteristic polynomial of a matrix of rational functions."""
     over_field = DomainMatrix.from_Matrix(matrix)
     coefficients = [over_field.domain.to_sympy(c) for c in over_field.charpoly()]
     polynomial = sp.Poly(coefficients, Z)
@@ -69,7 +69,7 @@ def symbolic_spectrum(matrix: sp.ImmutableDenseMatrix, name: str) -> SymbolicSpe
 
 
 def _roots(factor: sp.Poly) -> list[sp.Expr]:
-    """Return the roots of a monic factor of degree 1 or 2; none of a higher one."""
+    """Return the roots of a monic factor of degree 1 or 2; an empty list for a higher degree."""
     c = factor.all_coeffs()
     if len(c) == 2:
         return [-c[1]]

@@ -1,8 +1,7 @@
-"""Spanning trees and resistances of a graph, from the characteristic polynomial of G: no eigenvalue is computed.
+"""Spanning trees and resistances of a graph, from the characteristic polynomial of G without eigenvalues.
 
-With det(z - G) = z^n + … + c_2 z² + c_1 z the product of the nonzero eigenvalues μ of -G is c_1, and
-the sum of their reciprocals is c_2 / c_1 (A. E. Brouwer, W. H. Haemers, Spectra of Graphs, Springer,
-2012, section 1.3.5).
+Let det(z - G) = z^n + … + c_2 z² + c_1 z.  The product of the nonzero eigenvalues μ of -G is c_1, and the
+sum of 1/μ is c_2 / c_1 (A. E. Brouwer, W. H. Haemers, Spectra of Graphs, Springer, 2012, section 1.3.5).
 """
 
 from __future__ import annotations
@@ -21,24 +20,24 @@ class WeightedGraph(Matrix, Protocol):
 
     @property
     def asymmetry(self) -> str:
-        """In words, the first links that do not act both ways with one weight; "" if all do."""
+        """Message on the first links that differ from their mirror image; "" if the graph is undirected."""
 
 
 def spanning_trees(graph: WeightedGraph) -> Fraction:
     """Return the sum over all spanning trees of the products of their weights, by the matrix-tree theorem.
 
-    Of a graph with weights of 1 it is the number of its spanning trees; it is 0 if the graph falls
-    into parts.
+    If all weights are 1, the sum is the number of spanning trees.  The sum is 0 if the graph is not
+    connected.
     """
     first, _ = _lowest(graph, "spanning trees")
     return first / graph.n
 
 
 def kirchhoff_index(graph: WeightedGraph) -> Fraction:
-    """Return the sum of the resistances between all pairs of nodes, weights taken for conductances.
+    """Return the sum of the resistances between all pairs of nodes, with weights as conductances.
 
-    It is n Σ 1/μ over the nonzero eigenvalues μ of -G (D. J. Klein, M. Randić, J. Math. Chem. 12,
-    81, 1993; I. Gutman, B. Mohar, J. Chem. Inf. Comput. Sci. 36, 982, 1996).
+    The sum equals n Σ 1/μ over the nonzero eigenvalues μ of -G (D. J. Klein, M. Randić, J. Math. Chem.
+    12, 81, 1993; I. Gutman, B. Mohar, J. Chem. Inf. Comput. Sci. 36, 982, 1996).
     """
     first, second = _lowest(graph, "Kirchhoff index")
     if not first:

@@ -1,1 +1,1 @@
-"""Balanced partitions, automorphisms and cluster states of a graph. It imports nothing of oscillators."""
+"""Balanced partitions, automorphisms and cluster states of a graph. Independent of oscillators."""

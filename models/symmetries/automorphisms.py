@@ -1,4 +1,4 @@
-"""The symmetries of a small graph: permutations of its nodes that keep every weight."""
+"""Symmetries of a small graph: permutations of the nodes that preserve every weight."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Permutation = tuple[int, ...]
 """The image of each node."""
 
 STEP_LIMIT = 2_000_000
-"""Images tried before the search ends, a choice: a few seconds."""
+"""Most images that a search tries (a few seconds), a choice."""
 
 
 def automorphisms(graph: Topology, limit: int = 20_000, step_limit: int = STEP_LIMIT) -> tuple[Permutation, ...]:
@@ -29,8 +29,8 @@ def automorphisms(graph: Topology, limit: int = 20_000, step_limit: int = STEP_L
 
 
 def _search(graph: Topology, step_limit: int) -> Iterator[Permutation]:
-    """Yield the automorphisms, by backtracking: assign images node by node, each next to one that is fixed."""
-    # An automorphism keeps the classes of the coarsest balanced partition, so images of other colours are not tried.
+    """Yield the automorphisms by backtracking: choose the image of one node after the other, neighbours first."""
+    # An automorphism preserves the classes of the coarsest balanced partition: try only images of the same class.
     weights = graph.rows
     colour = coarsest_balanced(graph.n, graph.links, [row[i] for i, row in enumerate(weights)])
     order, anchor = _order(graph, colour)
@@ -54,7 +54,7 @@ def _search(graph: Topology, step_limit: int) -> Iterator[Permutation]:
                 )
             if j in used or colour[i] != colour[j]:
                 continue
-            # the weights to and from all nodes with an image must agree
+            # The weights to and from all nodes that have an image must agree.
             if all(weights[i][o] == weights[j][p] and weights[o][i] == weights[p][j] for o, p in image.items()):
                 image[i] = j
                 used.add(j)
@@ -65,7 +65,7 @@ def _search(graph: Topology, step_limit: int) -> Iterator[Permutation]:
 
 
 def _order(graph: Topology, colour: tuple[int, ...]) -> tuple[list[int], dict[int, int]]:
-    """Return all nodes, breadth first from rare colours, and for each but the first of a part an earlier neighbour."""
+    """Order the nodes breadth first, from rare colours; map each to an earlier neighbour, if it has one."""
     near = _neighbours(graph)
     rare = sorted(range(graph.n), key=lambda i: (colour.count(colour[i]), i))
     order: list[int] = []
@@ -86,7 +86,7 @@ def _order(graph: Topology, colour: tuple[int, ...]) -> tuple[list[int], dict[in
 
 
 def _neighbours(graph: Topology) -> list[list[int]]:
-    """Return for each node those that it is linked with in either direction, ascending."""
+    """Return for each node its neighbours by links in either direction, ascending."""
     near: list[set[int]] = [set() for _ in range(graph.n)]
     for target, source, _ in graph.links:
         near[target].add(source)

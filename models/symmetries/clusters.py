@@ -1,10 +1,10 @@
-"""Cluster states of a small graph: nodes that can move as one, and the equations of their differences.
+"""Cluster states of a small graph: clusters of nodes with equal states, and the equations of differences within them.
 
-A symmetry of the graph maps solutions to solutions: the nodes of an orbit of a group of symmetries
-may stay equal.  The differences within the clusters obey a linear equation among themselves.  With
-x_i - x_first(cluster) as coordinates it is rational, and it falls into blocks, one for each set of
-intertwined clusters.  The row sums of G are zero, so the partitions that G leaves invariant are the
-external equitable ones.
+A symmetry of the graph maps solutions to solutions, so nodes in one orbit of a group of symmetries can
+stay equal.  To first order, the differences within clusters obey linear equations that contain no other
+variables.  In the coordinates x_i - x_first(cluster) these equations have rational coefficients and
+separate into blocks, one for each set of intertwined clusters.  Because the row sums of G are zero, the
+invariant partitions of G are the external equitable partitions.
 
 Sources: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014): clusters from
 symmetries, blocks, isolated desynchronisation; Golubitsky & Stewart, Bull. Amer. Math. Soc. 43, 305
@@ -29,34 +29,34 @@ from .automorphisms import automorphisms
 from .partitions import class_links
 
 NODE_LIMIT = 64
-"""Largest graph with a search for symmetries, a choice."""
+"""Most nodes of a graph whose symmetries are searched, a choice."""
 
 PARTITION_LIMIT = 5000
-"""Most partitions that are listed, a choice."""
+"""Most partitions in a list, a choice."""
 
 Rows = tuple[tuple[Fraction, ...], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Differences that influence each other and no others."""
+    """A set of differences that influence each other, and no differences outside the set."""
 
     clusters: tuple[int, ...]  # the intertwined clusters
-    nodes: tuple[int, ...]  # the cluster on whose orbit each of the b coordinates lives
+    nodes: tuple[int, ...]  # for each of the b coordinates, the cluster that contains its nodes
     pairs: tuple[tuple[int, int], ...]  # coordinate k is x_i - x_j for ``pairs[k] = (i, j)``
-    matrix: Rows  # b x b; takes the place of G in the variational equation
+    matrix: Rows  # b x b; replaces G in the variational equation
 
 
 @dataclass(frozen=True, slots=True)
 class Clusters:
-    """A balanced partition.  The eigenvalues of quotient and blocks are together those of G.
+    """A balanced partition.  The eigenvalues of the quotient and of all blocks together are those of G.
 
     Parameters
     ----------
     classes : tuple of int
         The cluster of each node; clusters are numbered by their first nodes.
     quotient : Topology
-        The network of the clusters.
+        The graph whose nodes are the clusters.
     blocks : tuple of Block
         The differences within clusters.
     """
@@ -74,9 +74,9 @@ class Clusters:
 def orbital_partitions(
     graph: Topology, limit: int = 20_000, partition_limit: int = PARTITION_LIMIT
 ) -> tuple[Clusters, ...]:
-    """Return all partitions into orbits of groups of symmetries, from single nodes upwards.
+    """Return all partitions into orbits of groups of symmetries, the finest first.
 
-    The orbits of one symmetry are its cycles; those of a group are the join of the orbits of its
+    The orbits of one symmetry are its cycles.  The orbits of a group are the join of the orbits of its
     elements.
 
     Parameters
@@ -84,14 +84,14 @@ def orbital_partitions(
     graph : Topology
         The graph.
     limit : int, optional
-        Greatest number of automorphisms.
+        Most automorphisms.
     partition_limit : int, optional
-        Greatest number of partitions.
+        Most partitions.
 
     Returns
     -------
     tuple of Clusters
-        The finest one, of single nodes, first.
+        The partitions; the first is the finest, in which every cluster is a single node.
 
     Raises
     ------
@@ -104,11 +104,12 @@ def orbital_partitions(
             f"{graph.name}({graph.n}): expected at most {NODE_LIMIT} nodes to look for symmetries; describe single "
             "partitions with `clusters`"
         )
-    # Partitions into cycles of one symmetry; all others are joins of these.  Close them under joins, the finest first.
+    # Start from the partitions into cycles of one symmetry; all orbital partitions are joins of these.  Close the set
+    # under joins, in the order from fine to coarse.
     cycles = {join(graph.n, enumerate(g)) for g in automorphisms(graph, limit)}
     closed = {tuple(range(graph.n))}
     for partition in sorted(cycles, key=_fine_first):
-        if partition not in closed:  # else a join of finer ones
+        if partition not in closed:  # otherwise already made as a join
             closed |= {join(graph.n, [*_stars(partition), *_stars(other)]) for other in closed}
         if len(closed) > partition_limit:
             raise ValueError(
@@ -136,9 +137,9 @@ def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
     Raises
     ------
     ValueError
-        If the partition is not balanced, or has not one class for each node.
+        If the partition is not balanced, or does not give one cluster for each node.
     TypeError
-        If it is no sequence.
+        If `classes` is no sequence.
     """
     graph = as_topology("clusters", graph)
     if not isinstance(classes, Collection) or isinstance(classes, Set | Mapping):
@@ -149,7 +150,7 @@ def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
 
 
 def _described(graph: Topology, classes: tuple[int, ...], characteristic: fmpq_poly) -> Clusters:
-    """Return quotient and blocks of a balanced partition, checked against det(x - G)."""
+    """Compute quotient and blocks of a balanced partition and check them against det(x - G)."""
     quotient = Topology(f"{graph.name} quotient", max(classes) + 1, class_links(graph.n, graph.links, classes))
     state = Clusters(classes, quotient, _blocks(graph, classes))
     check(state, graph, characteristic)
@@ -157,7 +158,7 @@ def _described(graph: Topology, classes: tuple[int, ...], characteristic: fmpq_p
 
 
 def check(state: Clusters, graph: Topology, characteristic: fmpq_poly) -> None:
-    """Raise ProofError if quotient and blocks do not multiply out to the polynomial of G."""
+    """Raise ProofError unless the characteristic polynomials of quotient and blocks multiply to that of G."""
     product = _polynomial(state.quotient.rows)
     for block in state.blocks:
         product *= _polynomial(block.matrix)
@@ -169,16 +170,16 @@ def check(state: Clusters, graph: Topology, characteristic: fmpq_poly) -> None:
 
 
 def _blocks(graph: Topology, classes: tuple[int, ...]) -> tuple[Block, ...]:
-    """Return the blocks of the differences from the first nodes of clusters."""
-    # Coordinates y_k = x_i - x_j, j the first node of the cluster of i.  With T the matrix of these differences and L
-    # the embedding x_i = y_k (0 on first nodes), the rates are T G L y: the partition is balanced, so the
-    # common part of a cluster drops out (Pecora et al. 2014, the lower right block of T G T^-1).
+    """Separate the differences from the first nodes of clusters into blocks."""
+    # Coordinates y_k = x_i - x_j, where j is the first node of the cluster of i: y = T x.  The embedding L sets
+    # x_i = y_k, and 0 on first nodes.  Then y' = T G L y, because the partition is balanced and the common motion of
+    # a cluster drops out (Pecora et al. 2014, the lower right block of T G T^-1).
     first = _first_members(classes)
     pairs = [(i, first[k]) for i, k in enumerate(classes) if i != first[k]]
     rows = graph.rows
     matrix = [[rows[i][column] - rows[j][column] for column, _ in pairs] for i, j in pairs]
 
-    # Clusters whose differences enter each other's rates are intertwined and share a block.
+    # Clusters are intertwined, and share a block, if the rates of one's differences contain the other's differences.
     cluster_of = [classes[i] for i, _ in pairs]
     coupled = [(cluster_of[a], cluster_of[b]) for a, row in enumerate(matrix) for b, entry in enumerate(row) if entry]
     group = join(max(classes) + 1, coupled)
@@ -196,7 +197,7 @@ def _first_members(classes: tuple[int, ...]) -> dict[int, int]:
 
 
 def _stars(classes: tuple[int, ...]) -> list[tuple[int, int]]:
-    """Return each node with the first of its class: the pairs whose join is the partition."""
+    """Pair each node with the first node of its class; the join of the pairs is the partition."""
     first = _first_members(classes)
     return [(i, first[k]) for i, k in enumerate(classes)]
 

@@ -1,4 +1,4 @@
-"""Balanced partitions: nodes of one class receive equal sums of weights from every class."""
+"""Balanced partitions: all nodes of a class feel equal sums of weights from every other class."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from ..graphs.links import Link, numbered
 
 
 def class_links(n: int, links: Iterable[Link], classes: Sequence[int]) -> tuple[Link, ...]:
-    """Return the links between the classes of a balanced partition."""
-    # the total weight that each node feels from each other class
+    """Return the links between the classes of a balanced partition; ValueError if the partition is not balanced."""
+    # Sum the weights that each node feels from each other class.
     felt: list[dict[int, Fraction]] = [{} for _ in range(n)]
     for target, source, weight in links:
         k = classes[source]
         if k != classes[target]:
             felt[target][k] = felt[target].get(k, Fraction(0)) + weight
-    # the first node of a class, and the totals that all others must feel too
+    # Compare the totals of each node with those of the first node of its class.
     chosen: dict[int, tuple[int, dict[int, Fraction]]] = {}
     for i, totals in enumerate(felt):
         nonzero = {k: weight for k, weight in totals.items() if weight != 0}
@@ -33,13 +33,13 @@ def class_links(n: int, links: Iterable[Link], classes: Sequence[int]) -> tuple[
 
 
 def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]) -> tuple[int, ...]:
-    """Return the class of each node in the coarsest balanced partition with classes of one colour.
+    """Return the class of each node in the coarsest balanced partition whose classes have one colour each.
 
     Notes
     -----
-    Colour refinement on the links and the diagonal that makes every row sum to zero: for this
-    matrix a partition is equitable exactly if it is balanced.  It takes O(m log n) additions of
-    whole numbers for m links, because the largest part of a class need not be looked at again.
+    The algorithm is colour refinement of G, the links with the diagonal that makes row sums zero: a
+    partition is equitable for G exactly if it is balanced.  m links take O(m log n) additions of
+    integers, because after a split the largest part is not processed again.
 
     References
     ----------
@@ -48,7 +48,7 @@ def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]
     if len(colours) != n:
         raise ValueError(f"colours: found {len(colours)} for {n} nodes; expected one for each node")
 
-    # For each source its targets with whole weights; the diagonal is minus the sum of the row.
+    # List the targets of each source with integer weights; the diagonal entry is minus the row sum.
     listed = tuple(links)
     scale = math.lcm(*(weight.denominator for _, _, weight in listed))
     columns: list[list[tuple[int, int]]] = [[] for _ in range(n)]
@@ -60,7 +60,7 @@ def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]
     for i, total in enumerate(row_sums):
         columns[i].append((i, -total))
 
-    # Split classes by the totals that their nodes feel from one class, until no class splits another.
+    # Split classes by the totals that their nodes feel from one class, until no class causes a split.
     class_of = list(numbered(colours))
     members: list[set[int]] = [set() for _ in {*class_of}]
     for i, k in enumerate(class_of):
@@ -71,7 +71,7 @@ def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]
         for j in members[queue.popleft()]:
             for i, weight_ij in columns[j]:
                 totals[i] = totals.get(i, 0) + weight_ij
-        parts: dict[int, dict[int, set[int]]] = {}  # of each class, by totals other than 0
+        parts: dict[int, dict[int, set[int]]] = {}  # class -> non-zero total -> nodes
         for i, total in totals.items():
             if total != 0:
                 parts.setdefault(class_of[i], {}).setdefault(total, set()).add(i)
@@ -85,7 +85,7 @@ def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]
 
 
 def _split(members: list[set[int]], k: int, parts: list[set[int]]) -> list[set[int]]:
-    """Split class k into parts and its remaining nodes; return all but the largest, which stays k."""
+    """Split class k into `parts` and the remaining nodes; class k keeps the largest, return the others."""
     remaining = len(members[k]) - sum(map(len, parts))
     parts.sort(key=len)
     if remaining == 0 and len(parts) == 1:
