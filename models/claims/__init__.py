@@ -1,1 +1,1 @@
-"""The language of claims about spectra and their verdicts. Nothing but the command line uses it."""
+"""The language of claims about spectra, and verdicts on claims. Only the command line uses this folder."""

@@ -1,7 +1,7 @@
-"""Numbers such as -4*sin(k*pi/n)**2 read as sums of cosines, thirty times faster than by SymPy.
+"""Read numbers such as -4*sin(k*pi/n)**2 as sums of cosines, thirty times faster than SymPy.
 
-Ranges of sizes need the speed: `ring n=3..200` with one line of text claims 20 000 numbers.  Every text
-that is not such a sum for certain, a wrong one too, is left to `number_text.exact_number`.
+Ranges of sizes need the speed: one line `ring n=3..200: …` claims 20 000 numbers.  For any other text,
+also a wrong one, return None: the caller then uses `number_text.exact_number`.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from ..inputs.reader import Algebra, Arithmetic, NoMeaning, ParsedText, parse
 from .number_text import DEPTH, LENGTH
 
 TERMS, POWER = 16, 4
-"""Most cosines of a sum and highest power, chosen: products of longer sums are slower than SymPy."""
+"""Most cosines of a sum, and highest power; both are choices, since SymPy is faster for longer products."""
 
 LARGEST = 10**10
-"""Bound of whole numbers and of denominators of angles; chosen so that sums of 16 cosines stay short."""
+"""Bound for integers and for denominators of angles, a choice that keeps sums of 16 cosines short."""
 
 _CIRCULAR = re.compile(r"[0-9A-Za-z_+\-*/() \t]*\b(?:sin|cos)\([0-9A-Za-z_+\-*/() \t]*", re.ASCII)
 _PI = fmpq_poly([0, 1])
 
 
 def cosine_sum(text: str, values: Mapping[str, int]) -> AngleSum | None:
-    """Return a number as a sum of cosines; None if it has no sin or cos, or is read by SymPy only."""
+    """Read a number as a sum of cosines; None if the text has no sin or cos, or only SymPy can read it."""
     expression = _parsed(text.strip())
     try:
         return None if expression is None else expression.evaluate(_CosineSums(values))
@@ -38,7 +38,7 @@ def cosine_sum(text: str, values: Mapping[str, int]) -> AngleSum | None:
         return None
 
 
-@lru_cache(maxsize=64)  # one text is read for all values of its letters
+@lru_cache(maxsize=64)  # parse a text once for all values of its letters
 def _parsed(text: str) -> ParsedText | None:
     return parse(text) if len(text) <= LENGTH and _CIRCULAR.fullmatch(text) else None
 
@@ -51,7 +51,7 @@ def _whole(value: int | float) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _CosineSums(Arithmetic[AngleSum]):
-    """Sums of at most TERMS cosines; `values` are those of the letters."""
+    """Algebra of sums of at most TERMS cosines; `values` maps letters to integers."""
 
     values: Mapping[str, int]
     deepest = DEPTH
@@ -101,7 +101,7 @@ class _CosineSums(Arithmetic[AngleSum]):
 
 @dataclass(frozen=True, slots=True)
 class _Angles(Arithmetic[fmpq_poly]):
-    """Angles as polynomials in pi, at most linear, with rational coefficients."""
+    """Algebra of angles a + b pi with rational a and b, stored as polynomials in pi."""
 
     values: Mapping[str, int]
     deepest = DEPTH

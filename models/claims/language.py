@@ -31,7 +31,7 @@ from .number_text import exact_number, whole_number
 from .parts import LARGEST, WORDS, PartClaim, interval, is_part, read_part
 
 BYTES, REPETITIONS = 1_000_000, 100_000
-"""Largest file, and most eigenvalues of a line with their multiplicities; both chosen to end within seconds."""
+"""Largest file in bytes, and most eigenvalues of a line, counted with multiplicity: choices for seconds of work."""
 
 _OPTIONS = r"((?:\s+[A-Za-z_]\w*=\S+)*)"
 _RANGE = re.compile(r"(\w+)\s+n\s*=\s*([0-9]{1,6})\s*\.\.\s*([0-9]{1,6})" + _OPTIONS)
@@ -42,10 +42,10 @@ _FORMS = "expected 'chain 4: …', 'star n=3..12: …', 'torus 9 shape=3x3: …'
 
 @dataclass(frozen=True, slots=True)
 class Claimed:
-    """A number of a claim: exactly one of `exact`, `interval` and `angle` is set."""
+    """One claimed number; exactly one of `exact`, `interval` and `angle` is set."""
 
-    text: str  # the number as messages show it
-    count: int  # how often it is claimed
+    text: str  # the number in messages
+    count: int  # claimed multiplicity
     exact: sp.Expr | None = None  # the number, if it is neither a sum of cosines nor an approximation
     interval: tuple[Fraction, Fraction] | None = None  # the numbers that round to an approximation
     angle: AngleSum | None = None  # the number, if it is a sum of cosines
@@ -57,20 +57,20 @@ class Claimed:
 
     @property
     def sum(self) -> AngleSum | None:
-        """The number as a sum of cosines; None if it is not read as one."""
+        """The number as a sum of cosines; None if the number is an approximation or no such sum."""
         if self.exact is not None and self.exact.is_Rational:
             return AngleSum.rational(to_fraction(self.exact))
         return self.angle
 
     @property
     def words(self) -> str:
-        """The number as messages name it."""
+        """The number with its decimal value, for a sentence of a message."""
         return self.text if self.angle is None else sp.sstr(self.number)
 
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """The claimed spectrum of one graph, or parts of it."""
+    """The claimed spectrum of one graph, or claims about parts of its spectrum."""
 
     line: int  # number of the line in the file
     text: str  # the line
@@ -81,7 +81,7 @@ class Claim:
 
 
 def read_claims(path: str | Path) -> list[tuple[Claim, ...]]:
-    """Return the claims of a text file, those of a line together; nothing in the file is run."""
+    """Read a text file; return a tuple of claims for each line.  The text is parsed, not run."""
     file = Path(path)
     shown = f"claims {short_repr(str(file))}"
     if not file.exists():
@@ -105,7 +105,7 @@ def read_claims(path: str | Path) -> list[tuple[Claim, ...]]:
 
 
 def _line(number: int, text: str, folder: Path) -> tuple[Claim, ...]:
-    """Return a claim for each graph of a line, "GRAPH: NUMBERS" or "GRAPH: PARTS"."""
+    """Read a line "GRAPH: NUMBERS" or "GRAPH: PARTS"; return one claim for each size of the graph."""
     head, colon, listed = (part.strip() for part in text.rpartition(":"))
     if not colon or not head:
         raise ValueError(f"found {short_repr(text)}; {_FORMS}")
@@ -157,7 +157,7 @@ def _family(name: str, n: int, options_text: str, largest: int | None) -> Topolo
 
 
 def _split(text: str, mark: str) -> Iterator[str]:
-    """Yield the parts of a text between marks outside parentheses."""
+    """Split a text at each `mark` outside parentheses."""
     depth, begin = 0, 0
     for end, letter in enumerate(text):
         depth += (letter == "(") - (letter == ")")
@@ -168,7 +168,7 @@ def _split(text: str, mark: str) -> Iterator[str]:
 
 
 def _entry(text: str, values: dict[str, int]) -> Iterator[Claimed]:
-    """Yield the numbers of an entry such as -2, -1^(n-2) or 2*k for k=0..3."""
+    """Yield the claimed numbers of an entry such as -2, -1^(n-2) or 2*k for k=0..3."""
     if not text:
         raise ValueError("found an empty entry between commas; expected a number")
     if many := _FOR.fullmatch(text):
@@ -202,6 +202,6 @@ def _entry(text: str, values: dict[str, int]) -> Iterator[Claimed]:
         yield Claimed(number, count, angle=angle)
     else:
         exact = exact_number(number, values)
-        # show a number without letters in the form of the file
+        # Show a number without letters as written in the file.
         shown = number if exact.is_Rational is False and not values else sp.sstr(exact)
         yield Claimed(shown, count, exact=exact)

@@ -1,8 +1,8 @@
-"""Exact numbers written as text, as SymPy expressions.
+"""Read exact numbers from text as SymPy expressions.
 
-Accepted: whole numbers, the letters given in `values` such as n, ``pi`` and ``I``, ``+ - * / **``,
-parentheses, ``sqrt``, and ``sin cos exp`` of rational multiples of pi (of I*pi for exp).  Decimals
-are refused: they are no exact numbers.
+Accepted are integers, the letters in `values` (such as n), ``pi`` and ``I``, ``+ - * / **``,
+parentheses, ``sqrt``, ``sin`` and ``cos`` of rational multiples of pi, and ``exp`` of rational multiples
+of I*pi.  Decimals are refused, because they may be rounded.
 """
 
 from __future__ import annotations
@@ -20,12 +20,14 @@ from ..algebra.equality import check_size, equal
 from ..inputs.reader import Algebra, Arithmetic, NoMeaning, parse, stray_character
 
 LENGTH, DEPTH, DIGITS, BITS = 300, 24, 30, 20_000
-"""Most characters, nested operations, digits of a literal and bits of a value; chosen so that a number takes no second."""
+"""Limits, chosen so that reading a number takes less than a second: characters, nested operations, digits of a
+literal, bits of a value.
+"""
 
 GRAMMAR = "whole numbers, + - * / **, parentheses, sqrt, I, and sin cos exp of rational multiples of pi"
 
 _PI = sp.Dummy("pi", real=True)
-"""pi in the argument of sin, cos or exp, so that SymPy evaluates no function of it before its factor is reduced."""
+"""Replaces pi in arguments of sin, cos and exp, so that SymPy evaluates them only after the angle is reduced."""
 
 _DECIMAL = re.compile(r"(?<![A-Za-z_])(?:[0-9]+\.[0-9]*|\.[0-9]+|[0-9]+(?=[eE][+-]?[0-9]))(?:[eE][+-]?[0-9]+)?")
 
@@ -53,7 +55,7 @@ def exact_number(text: str, values: Mapping[str, int] | None = None) -> sp.Expr:
 
 
 def whole_number(text: str, values: Mapping[str, int] | None = None) -> int:
-    """Return the value of an expression such as ``"n-2"`` that is a whole number."""
+    """Return the integer value of an expression such as ``"n-2"``; ValueError for any other value."""
     number = exact_number(text, values)
     if not number.is_Integer:
         raise ValueError(f"{text.strip()!r} is {number}; expected a whole number")
@@ -62,7 +64,7 @@ def whole_number(text: str, values: Mapping[str, int] | None = None) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _ExactNumbers(Arithmetic[sp.Expr]):
-    """SymPy numbers without floats; multiples of pi too in an argument of sin, cos or exp (`angle`)."""
+    """Algebra of exact SymPy numbers; with `angle`, of arguments of sin, cos or exp, where pi is allowed too."""
 
     text: str
     values: Mapping[str, int]
@@ -133,10 +135,10 @@ class _ExactNumbers(Arithmetic[sp.Expr]):
             raise NoMeaning(f"expected a rational times {unit_text}")
         if turn.q > 10_000:
             raise NoMeaning("expected a denominator up to 10000")
-        turn -= 2 * sp.floor(turn / 2)  # the functions have the period 2π
+        turn -= 2 * sp.floor(turn / 2)  # sin, cos and exp(I x) have the period 2π
         if function == "exp":
             return sp.exp(turn * sp.pi * sp.I)
-        # SymPy writes other angles as nested radicals, which generate far larger fields
+        # Evaluate only short angles: SymPy writes others as nested radicals, which generate much larger fields.
         short = turn.q in (1, 2, 3, 4, 6)
         return (sp.sin if function == "sin" else sp.cos)(turn * sp.pi, evaluate=short)
 

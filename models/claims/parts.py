@@ -1,15 +1,16 @@
-"""Claims about parts of a spectrum, for graphs of any size, read and decided.
+"""Read and decide claims about parts of a spectrum, for graphs of any size.
 
 Example: chain 1000000: largest = -4*cos(pi/(2*n))**2.
 
-largest, slowest        the eigenvalues of largest modulus, and of smallest modulus other than 0
-ratio                   their quotient, of real eigenvalues
-distinct                how many different eigenvalues there are
-multiplicity(number)    how often a number is an eigenvalue, 0 if it is none
+largest                 the eigenvalue of largest modulus
+slowest                 the non-zero eigenvalue of smallest modulus
+ratio                   largest / slowest, for real eigenvalues
+distinct                the number of distinct eigenvalues
+multiplicity(number)    the multiplicity of a number, 0 if the number is no eigenvalue
 
-Each stands before =, <, >, <= or >= and an exact number.  An approximation such as ~-3.414 may
-stand behind =, a decimal, which is then exact, behind the others.  Each comparison is decided
-exactly.
+A claim is a part, a relation (=, <, >, <= or >=) and an exact number.  After = the number may be an
+approximation such as ~-3.414; after the other relations it may be a decimal, which counts as exact.
+All comparisons are exact.
 """
 
 from __future__ import annotations
@@ -39,10 +40,13 @@ from .cosine_text import cosine_sum
 from .number_text import exact_number
 
 LARGEST = 500
-"""Largest graph whose spectrum is proved here; chosen, since proofs of closed forms take seconds above it."""
+"""Most nodes of a graph whose spectrum is proved here, a choice: proofs of larger closed forms take seconds."""
 
 LISTED = 5000
-"""Largest graph whose eigenvalues are listed, unless there are few or each is computed alone; chosen, a few seconds."""
+"""Most nodes of a graph whose eigenvalues are listed, a choice (a few seconds).
+
+The limit does not apply if the distinct eigenvalues are few or computed one by one.
+"""
 
 WORDS = ("largest", "slowest", "ratio", "distinct", "multiplicity")
 T = TypeVar("T", bound=Number)
@@ -57,23 +61,23 @@ _DECIMAL = re.compile(r"[+-]?[0-9]{1,40}\.[0-9]{1,60}")
 
 @dataclass(frozen=True, slots=True)
 class PartClaim:
-    """The claim about one part of a spectrum."""
+    """A claim about one part of a spectrum."""
 
-    text: str  # the claim as it was written
+    text: str  # the claim in the file
     word: str  # one of WORDS
     relation: str  # one of = < > <= >=
-    number: Exact | None = None  # the number behind the relation
-    interval: tuple[Fraction, Fraction] | None = None  # the numbers that round to an approximation in its place
+    number: Exact | None = None  # the exact number after the relation
+    interval: tuple[Fraction, Fraction] | None = None  # or the numbers that round to the approximation
     of: Exact | None = None  # the number whose multiplicity is claimed
 
 
 def is_part(text: str) -> bool:
-    """Return whether a text begins with a word of WORDS."""
+    """Return whether a text is a claim about a part: begins with a word of WORDS."""
     return re.match(rf"({'|'.join(WORDS)})\b", text) is not None
 
 
 def read_part(text: str, values: Mapping[str, int]) -> PartClaim:
-    """Return the claim in a text such as "ratio < 37.9"."""
+    """Read a claim such as "ratio < 37.9"."""
     match = _PART.fullmatch(text)
     if match is None:
         raise ValueError(f"found {text[:60]!r}; expected e.g. largest = -4, ratio < 37.9 or multiplicity(-2) = 3")
@@ -96,7 +100,7 @@ def read_part(text: str, values: Mapping[str, int]) -> PartClaim:
 
 
 def exact(text: str, values: Mapping[str, int]) -> Exact:
-    """Return a number as a sum of cosines if it is one, else as a SymPy expression."""
+    """Read a number as a sum of cosines if possible, else as a SymPy expression."""
     angle = cosine_sum(text, values)
     if angle is None:
         number = exact_number(text, values)
@@ -106,7 +110,7 @@ def exact(text: str, values: Mapping[str, int]) -> Exact:
 
 
 def interval(text: str) -> tuple[Fraction, Fraction]:
-    """Return the ends of the interval of numbers that round to an approximation such as ~-3.414."""
+    """Return the interval of the numbers that round to an approximation such as ~-3.414."""
     rounded = _ROUNDED.fullmatch(text)
     if not rounded:
         raise ValueError(f"unreadable approximation {text[:60]!r}; expected ~ and a real decimal, e.g. ~-3.414")
@@ -122,9 +126,9 @@ _RELATIONS: dict[str, Callable[[int, int], bool]] = {"=": eq, "<": lt, ">": gt, 
 def verify_parts(graph: Topology, parts: Sequence[PartClaim]) -> tuple[tuple[str, ...], bool, str]:
     """Compare claimed parts with the spectrum of a graph.
 
-    A chain, a ring, and grids, tori and Cartesian products of families need no list of their
-    eigenvalues: the extreme ones are sums of those of the factors.  Other closed forms are listed
-    up to LISTED nodes.
+    Chains, rings, grids, tori and Cartesian products of families need no list of eigenvalues: extreme
+    eigenvalues are sums of extreme eigenvalues of the factors.  Other closed forms are listed up to
+    LISTED nodes.
     """
     true_parts = _Parts(graph)
     problems, right = [], []
@@ -139,13 +143,13 @@ def verify_parts(graph: Topology, parts: Sequence[PartClaim]) -> tuple[tuple[str
 
 @dataclass
 class _Parts:
-    """The parts of a graph's spectrum, each computed on first use."""
+    """The true parts of a graph's spectrum, each computed on first use."""
 
     graph: Topology
 
     @cached_property
     def spectrum(self) -> Spectrum:
-        """All eigenvalues, proved up to LARGEST nodes."""
+        """The whole spectrum, proved up to LARGEST nodes."""
         n = self.graph.n
         if n > LARGEST and not has_closed_form(self.graph):
             raise ValueError(f"{self.graph.name} {n}: a graph without a closed form; expected at most {LARGEST} nodes")
@@ -157,28 +161,28 @@ class _Parts:
 
     @cached_property
     def axes(self) -> tuple[Topology, ...]:
-        """The chains, rings and others whose Cartesian product a large graph is; else the graph."""
+        """The factors of a large graph that is a Cartesian product; for any other graph the graph alone."""
         return tuple(_axes(self.graph)) if self.graph.n > LARGEST else (self.graph,)
 
     @cached_property
     def largest(self) -> Value:
-        """The eigenvalue of largest modulus: of a product the sum of those of its factors."""
+        """The eigenvalue of largest modulus; for a product the sum of the largest eigenvalues of the factors."""
         if len(self.axes) == 1:
             return _value(self.spectrum.largest)
         return sum((_sum(axis.spectrum.largest) for axis in self.axes), AngleSum.rational(0))
 
     @cached_property
     def slowest(self) -> Value:
-        """The eigenvalue other than 0 of smallest modulus, found among those of the factors."""
+        """The non-zero eigenvalue of smallest modulus; for a product the smallest one of all factors."""
         if len(self.axes) == 1:
             return _value(self.spectrum.slowest)
         return reduce(lambda a, b: b if _order(b, a) > 0 else a, [_sum(axis.spectrum.slowest) for axis in self.axes])
 
     def multiplicity(self, number: Exact) -> int:
-        """Return how often a number is an eigenvalue."""
+        """Return the multiplicity of a number, 0 if the number is no eigenvalue."""
         eigenvalues = self.spectrum.eigenvalues
         low, high = 0, len(eigenvalues)
-        if isinstance(eigenvalues, LazyEigenvalues):  # chains and rings descend: bisect, and compare two neighbours
+        if isinstance(eigenvalues, LazyEigenvalues):  # sorted in descending order: bisect, then compare two neighbours
             while low < high:
                 middle = (low + high) // 2
                 if _order(_value(eigenvalues[middle].exact), number) > 0:
@@ -190,9 +194,9 @@ class _Parts:
 
 
 def _axes(graph: Topology) -> Iterator[Topology]:
-    """Yield the factors of a Cartesian product with more than one node.
+    """Yield the factors of a Cartesian product, without factors of one node.
 
-    Products are taken apart if the spectrum of each factor is short and not above 0.
+    A product is factored if both factors have a short spectrum without positive eigenvalues.
     """
     pair = factors(graph)
     if graph.name in ("grid", "torus") and (sides := family(graph.name).sides):
@@ -206,12 +210,12 @@ def _axes(graph: Topology) -> Iterator[Topology]:
 
 
 def _is_short(graph: Topology) -> bool:
-    """Return whether a closed form has few different eigenvalues, or computes them one by one."""
+    """Return whether a closed form has few distinct eigenvalues, or computes eigenvalues one by one."""
     return graph.name in ("chain", "ring", "complete", "complete_bipartite", "star", "hypercube", "feed_forward")
 
 
 def _compare(part: PartClaim, true_parts: _Parts) -> tuple[bool, str]:
-    """Return whether a part is as claimed, and its true value as text."""
+    """Return (whether the claim holds, true value of the part as text)."""
     one = AngleSum.rational(1)
     if part.word in ("distinct", "multiplicity"):
         of = part.of if part.of is not None else AngleSum.rational(0)
@@ -236,7 +240,7 @@ def _compare(part: PartClaim, true_parts: _Parts) -> tuple[bool, str]:
 
 
 def _holds(part: PartClaim, value: Value, unit: Value) -> bool:
-    """Return whether value / unit is as claimed; the unit is 1, or the slowest eigenvalue."""
+    """Return whether the claim holds for value / unit; the unit is the slowest eigenvalue for a ratio, else 1."""
     if _is_complex(value) or _is_complex(unit):
         raise ValueError(f"{part.text}: complex eigenvalues have no order; expected = and an exact number")
     if part.interval is not None:
@@ -265,7 +269,7 @@ def _order(value: Value, number: Exact) -> int:
 
 def _is_equal(e: Eigenvalue, number: Exact) -> bool:
     middle = complex(sp.N(_expression(number), 20))
-    if abs(complex(e.value) - middle) > 1e-9 * max(1.0, abs(middle)):  # floats decide without a proof
+    if abs(complex(e.value) - middle) > 1e-9 * max(1.0, abs(middle)):  # floats this far apart are different numbers
         return False
     value = _value(e.number)
     if isinstance(value, AngleSum) and isinstance(number, AngleSum):
@@ -274,7 +278,7 @@ def _is_equal(e: Eigenvalue, number: Exact) -> bool:
 
 
 def _value(number: Number) -> Value:
-    """Return an eigenvalue as a sum of cosines if it is one."""
+    """Convert an eigenvalue to a sum of cosines if possible."""
     angle = None if isinstance(number, Root) else read(number)
     return number if angle is None else angle
 
@@ -287,7 +291,7 @@ def _sum(number: sp.Expr) -> AngleSum:
 
 
 def _expression(value: AngleSum | T) -> sp.Expr | T:
-    """Return a sum of cosines as an expression, anything else unchanged."""
+    """Convert a sum of cosines to an expression; return any other value unchanged."""
     return expression(value.risen) if isinstance(value, AngleSum) else value
 
 

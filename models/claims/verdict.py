@@ -1,4 +1,4 @@
-"""The verdict on a claimed spectrum: every number compared exactly, errors named in sentences."""
+"""The verdict on a claimed spectrum: compare every number exactly, and describe each error in a sentence."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from .parts import verify_parts
 
 @dataclass(frozen=True, slots=True)
 class ClaimVerdict:
-    """The result of the comparison of a claim."""
+    """The result of comparing a claim with the spectrum of its graph."""
 
     claim: Claim
     problems: tuple[str, ...]  # a sentence for each error
-    proved: bool = True  # False if a closed form was taken on trust
+    proved: bool = True  # False if a closed form was used without proof
     parts: str = ""  # the true values of the claimed parts
 
     @property
     def right(self) -> bool:
-        """True if the claim is exactly the spectrum (to its digits if it is approximate)."""
+        """True if the claim equals the spectrum exactly; approximate numbers are compared to their digits."""
         return not self.problems
 
     @property
@@ -43,7 +43,7 @@ class ClaimVerdict:
 
     @property
     def expected(self) -> str:
-        """The right claim, in the language of claims files."""
+        """The correct claim, in the language of claims files."""
         return self.parts or ", ".join(entry(e) for e in self.eigenvalues)
 
 
@@ -51,7 +51,7 @@ def verify(claim: Claim) -> ClaimVerdict:
     """Compare a claim with the proved spectrum of its graph."""
     if claim.parts:
         return ClaimVerdict(claim, *verify_parts(claim.graph, claim.parts))
-    # a right claim about sums of cosines costs no roots: its numbers multiply out to det(x - G)
+    # Fast path: if all claimed numbers are sums of cosines and multiply out to det(x - G), no roots are needed.
     sums = [(claimed.sum, claimed.count) for claimed in claim.numbers]
     known = [(number, count) for number, count in sums if number is not None]
     complete = sum(count for _, count in sums) == claim.graph.n and len(known) == len(sums)
@@ -61,11 +61,12 @@ def verify(claim: Claim) -> ClaimVerdict:
 
 
 def _problems(claim: Claim) -> Iterator[str]:
-    """Compare the numbers one by one, and yield a sentence for each that is wrong."""
+    """Compare the numbers one by one; yield a sentence for each error."""
     eigenvalues = spectrum(claim.graph, Proof.EXACT).eigenvalues
-    tally = [0] * len(eigenvalues)  # how often each eigenvalue is claimed
+    tally = [0] * len(eigenvalues)  # claimed multiplicity of each eigenvalue
 
-    # Exact numbers: equal folded sums are equal numbers; different ones may be equal too, so ask SymPy then.
+    # Exact numbers: look up equal folded sums first.  Different folded sums may still be equal numbers, so otherwise
+    # compare exactly with all eigenvalues whose decimals agree.
     angles: dict[AngleSum, int] = {}
     if any(claimed.angle is not None for claimed in claim.numbers):
         for i, e in enumerate(eigenvalues):
@@ -98,12 +99,13 @@ def _problems(claim: Claim) -> Iterator[str]:
 def _assign_approximations(
     numbers: Sequence[Claimed], eigenvalues: Sequence[Eigenvalue], tally: list[int]
 ) -> Iterator[str]:
-    """Count each approximation for eigenvalues that round to it; yield a sentence for each that finds none."""
+    """Assign approximations to eigenvalues that round to them; yield a sentence for each without an eigenvalue."""
     rising = sorted(
         (i for i, e in enumerate(eigenvalues) if not isinstance(e.value, complex)),
         key=lambda i: eigenvalues[i].value.real,
     )
-    # Greedy matching of points to intervals: by upper ends, each takes the smallest free points.  It matches most.
+    # Greedy matching of intervals to points: in the order of upper ends, each interval takes the smallest free points.
+    # This order matches as many as possible.
     approximations = [(*claimed.interval, claimed) for claimed in numbers if claimed.interval is not None]
     for low, high, claimed in sorted(approximations, key=lambda approximation: approximation[1]):
         inside = [i for i in rising if _is_between(low, eigenvalues[i], high)]
@@ -122,7 +124,7 @@ def _assign_approximations(
 
 
 def _middle(number: sp.Expr | Root) -> complex:
-    """Return a number to a relative error of 1e-18, which leaves few eigenvalues to compare exactly."""
+    """Return a number to a relative error of 1e-18, so that few eigenvalues need an exact comparison."""
     bits = 128
     while True:
         ball = acb(number.enclosure(bits) if isinstance(number, Root) else enclose(number, bits))

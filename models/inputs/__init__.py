@@ -1,1 +1,1 @@
-"""Text, numbers, expressions and options of users: read, checked, refused. No networks."""
+"""Read and check the user's text, numbers, expressions and options. Independent of networks."""

@@ -1,4 +1,4 @@
-"""Numbers written as text in a scene file: constant expressions in floating point.
+"""Evaluate numbers written as text in a scene file: constant expressions in floating point.
 
 Accepted: decimal numbers, ``pi``, ``+ - * / **``, parentheses and ``sqrt exp log sin cos`` of one
 argument.
@@ -16,7 +16,7 @@ from typing import NoReturn
 from .reader import Algebra, NoMeaning, parse, stray_character, unpaired
 
 LENGTH, DEPTH, EXPONENT, MAGNITUDE = 200, 24, 100.0, 1e100
-"""Most characters and nested operations, largest exponent and value: choices, far above what a parameter needs."""
+"""Limits, choices far above the needs of a parameter: characters, nested operations, exponent, value."""
 
 FUNCTIONS: dict[str, Callable[[float], float]] = {
     "cos": math.cos,
@@ -44,7 +44,7 @@ def constant(text: str) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Floats(Algebra[float]):
-    """Floating-point numbers up to MAGNITUDE, checked after every operation."""
+    """Algebra of floating-point numbers up to MAGNITUDE, checked after every operation."""
 
     text: str
     deepest = DEPTH

@@ -22,14 +22,14 @@ from .arithmetic import constant
 from .unsupported import unsupported
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
-"""Control characters, ends of lines, changes of direction, and surrogates."""
+"""Control characters, line separators, changes of writing direction, and surrogates."""
 
 
 def short_repr(value: object) -> str:
     """Return `repr` of any value on one line of at most 120 characters, for an error message.
 
-    A value whose `repr` fails is named by its type: a broken `__repr__`, or an integer beyond
-    Python's limit of digits, must not hide the message.
+    If `repr` fails (a broken `__repr__`, an integer beyond Python's limit of digits), return the type of
+    the value, so that the error message still appears.
     """
     short = reprlib.Repr()
     short.maxstring = short.maxother = 60
@@ -45,7 +45,7 @@ T = TypeVar("T")
 
 
 def suggestion(name: object, names: Iterable[str], other: Mapping[str, str] | None = None) -> str:
-    """Return "; did you mean …?" for a name close to a valid one, or to another word for one; "" for any other."""
+    """Return "; did you mean …?" if a name is close to one of `names` or to a synonym in `other`, else ""."""
     if not isinstance(name, str):
         return ""
     targets = {candidate: candidate for candidate in names}
@@ -56,11 +56,11 @@ def suggestion(name: object, names: Iterable[str], other: Mapping[str, str] | No
 
 
 _NUMBERED = re.compile(r"(.+?)((?:_\d+)+)")
-"""Names of one node or link, such as a_2 or k_1_2."""
+"""Names of variables of one node or link, such as a_2 or k_1_2."""
 
 
 def listed(names: Iterable[str]) -> str:
-    """Join names by commas; of three or more in a row that differ in their numbers alone, only the first and the last."""
+    """Join names by commas; abbreviate three or more successive names that differ only in numbers, as a_1 … a_9."""
     parts: list[str] = []
     for base, same in groupby(names, lambda name: match[1] if (match := _NUMBERED.fullmatch(name)) else name):
         row = list(same)
@@ -69,7 +69,7 @@ def listed(names: Iterable[str]) -> str:
 
 
 def first_of(values: Iterable[T], n: int) -> tuple[tuple[T, ...], str]:
-    """Return up to n + 1 of some values, and their number as text: "more than n" for an iterator, which is not counted."""
+    """Return up to n + 1 of the values, and their number as text; for a longer iterator the text is "more than n"."""
     first = tuple(islice(values, n + 1))
     endless = len(first) > n and not isinstance(values, Sized)
     return first, f"more than {n}" if endless else str(len(values) if isinstance(values, Sized) else len(first))
@@ -81,7 +81,7 @@ def is_row(value: object) -> TypeGuard[Iterable[Any]]:
 
 
 def check_keys(what: str, table: Mapping[object, object], names: Iterable[str]) -> None:
-    """Raise an error unless all keys of a mapping are texts out of `names`."""
+    """Raise an error unless every key of a mapping is one of `names`."""
     names = tuple(names)
     for key in table:
         if not isinstance(key, str):
@@ -94,14 +94,14 @@ def check_keys(what: str, table: Mapping[object, object], names: Iterable[str]) 
 
 
 def check_table(what: str, value: object) -> Mapping[object, object]:
-    """Return a value that is a mapping; raises TypeError on any other."""
+    """Return the value if it is a mapping; TypeError for any other."""
     if not isinstance(value, Mapping):
         raise TypeError(f"{what}: found {typed_repr(value)}; expected a table of names and values")
     return value
 
 
 def check_text(what: str, value: object, limit: int = 200) -> str:
-    """Return a value that is a short text without control characters."""
+    """Return the value if it is a text of at most `limit` characters without control characters."""
     if not isinstance(value, str):
         raise TypeError(f"{what}: found {typed_repr(value)}; expected text in quotation marks")
     if len(value) > limit:
@@ -110,9 +110,9 @@ def check_text(what: str, value: object, limit: int = 200) -> str:
 
 
 def check_printable(what: str, value: str) -> str:
-    """Return a text without control characters; raises ValueError if it has one.
+    """Return the text; ValueError if it contains a control character.
 
-    A terminal obeys control characters, and a name may come from any file.
+    A terminal executes control characters, and a name may come from any file.
     """
     control = _CONTROL.search(value)
     if control:
@@ -124,7 +124,7 @@ def check_printable(what: str, value: str) -> str:
 
 
 def check_choice(what: str, value: object, names: tuple[str, ...]) -> str:
-    """Return a value that is one of some names."""
+    """Return the value if it is one of `names`."""
     name = check_text(what, value)
     if name not in names:
         raise ValueError(f"unknown {what} {short_repr(name)}; known: {', '.join(names)}{suggestion(name, names)}")
@@ -132,7 +132,7 @@ def check_choice(what: str, value: object, names: tuple[str, ...]) -> str:
 
 
 def check_number(what: str, value: object, low: float | None = None, high: float | None = None) -> float:
-    """Return a finite float, of a number or of a constant expression such as "2*pi"."""
+    """Convert a number, or a constant expression such as "2*pi", to a finite float from `low` to `high`."""
     if getattr(value, "ndim", None) == 0:
         value = value.item()  # type: ignore[attr-defined]
     if isinstance(value, str):
@@ -155,12 +155,12 @@ def check_number(what: str, value: object, low: float | None = None, high: float
 
 
 def _is_exact(value: object) -> bool:
-    """True for a real number of SymPy, found without importing SymPy."""
+    """Return whether a value is a real number of SymPy, without importing SymPy."""
     return bool(getattr(value, "is_number", False) and getattr(value, "is_real", False))
 
 
 def _span(low: float | None, high: float | None) -> str:
-    """Describe a closed range with optional ends."""
+    """Describe the range from `low` to `high` for a message; None means no bound."""
     if high is None:
         return "a number" if low is None else f"a number of at least {low:g}"
     return f"a number of at most {high:g}" if low is None else f"a number from {low:g} to {high:g}"
@@ -174,26 +174,26 @@ def typed_repr(value: object) -> str:
 
 
 def check_instance(what: str, value: object, kind: type[T] | tuple[type[T], ...], expected: str) -> T:
-    """Return a value that is of a type."""
+    """Return the value if it is an instance of `kind`; TypeError for any other."""
     if not isinstance(value, kind):
         raise TypeError(f"{what}: found {typed_repr(value)}; expected {expected}")
     return value
 
 
 def check_callable(what: str, value: object) -> Callable[..., object]:
-    """Return a value that can be called; raises TypeError on any other."""
+    """Return the value if it is callable; TypeError for any other."""
     if not callable(value):
         raise TypeError(f"{what}: found {typed_repr(value)}; expected a function")
     return value
 
 
 def check_flag(what: str, value: object) -> bool:
-    """Return a value that is True or False; raises TypeError on any other."""
+    """Return the value if it is True or False; TypeError for any other."""
     return check_instance(what, value, bool, "True or False")
 
 
 def check_integer(what: str, value: object, low: int, high: int | None = None) -> int:
-    """Return a whole number as an int; a float is refused even if it is whole."""
+    """Return an integer from `low` to `high` as an int; TypeError for a float, even a whole one."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral):
         raise TypeError(f"{what} = {short_repr(value)}; expected a whole number, e.g. {max(low, 1)}")
     result = operator.index(value)
@@ -205,7 +205,7 @@ def check_integer(what: str, value: object, low: int, high: int | None = None) -
 
 
 def check_positive(what: str, value: object) -> float:
-    """Return a finite number above 0; TypeError and ValueError as `check_number`."""
+    """Return a finite number above 0; TypeError and ValueError like `check_number`."""
     result = check_number(what, value)
     if result <= 0.0:
         raise ValueError(f"{what}: found {result:g}; expected a number above 0")
@@ -213,7 +213,7 @@ def check_positive(what: str, value: object) -> float:
 
 
 def check_path(what: str, value: object) -> Path:
-    """Return a path."""
+    """Convert a text or a path to a Path."""
     if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
         raise TypeError(f"{what}: found {typed_repr(value)}; expected a path, e.g. 'data/G.txt'")
     if not os.fspath(value).strip() or "\0" in os.fspath(value):

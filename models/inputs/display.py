@@ -1,4 +1,4 @@
-"""Base classes of values with HTML, LaTeX or a drawing in notebooks; the rooms above write these."""
+"""Base classes of values that a notebook shows as HTML, LaTeX or a drawing; `synchain.runtime` makes these."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 class HasHtml:
     """A value with HTML for notebooks, written by `synchain.runtime.reports`.
 
-    Its public methods refuse wrong arguments as public functions do (`check_methods`).
+    Public methods of a subclass refuse wrong arguments like public functions (`check_methods`).
     """
 
     __slots__ = ()
@@ -33,7 +33,7 @@ class HasHtml:
 
 
 class HasLatex(HasHtml):
-    """A value with LaTeX besides."""
+    """A value with HTML and LaTeX."""
 
     __slots__ = ()
 
@@ -44,7 +44,7 @@ class HasLatex(HasHtml):
 
 
 class HasPlot(HasHtml):
-    """A value with a picture of its numbers."""
+    """A value with a plot of its numbers."""
 
     __slots__ = ()
 
@@ -54,7 +54,7 @@ class HasPlot(HasHtml):
         Parameters
         ----------
         ax : matplotlib axes, optional
-            By default pyplot's current ones, or those of a new figure.
+            By default pyplot's current axes, or the axes of a new figure.
         **style
             Keywords of the Matplotlib artist that draws the main curve or the colours, such as
             `color`, `linewidth`, `cmap`.
@@ -71,15 +71,15 @@ class HasPlot(HasHtml):
 
 
 class HasAnimation(HasPlot):
-    """A value with a motion."""
+    """A value that can be animated."""
 
     __slots__ = ()
 
     def animate(self, seconds: float = 10.0, fps: int = 25) -> Animation:
         """Return an animation of the first cell: a notebook plays it, ``save("motion.gif")`` writes it.
 
-        Oscillators with friction are masses on a moving belt, up to twelve of them; others are the
-        nodes of their graph, coloured by their first state. The phase portrait is beside them.
+        Up to twelve oscillators with friction are drawn as masses on a moving belt; other oscillators are
+        drawn as nodes of their graph, coloured by the first state.  A phase portrait is drawn beside them.
 
         Parameters
         ----------
@@ -91,7 +91,7 @@ class HasAnimation(HasPlot):
         Returns
         -------
         matplotlib.animation.FuncAnimation
-            ``save`` writes GIF files with Pillow, MP4 files with ffmpeg if that is installed.
+            ``save`` writes GIF files with Pillow, and MP4 files with ffmpeg if ffmpeg is installed.
 
         Raises
         ------
@@ -107,23 +107,23 @@ class HasAnimation(HasPlot):
         """
         from synchain.runtime.plots.animation import animate
 
-        return animate(self, seconds, fps)  # type: ignore[arg-type]  # a Result, the only value with a motion
+        return animate(self, seconds, fps)  # type: ignore[arg-type]  # self is a Result, the only subclass
 
 
 class HasDrawing(HasHtml):
-    """A graph, or a value with a graph."""
+    """A graph, or a value that contains a graph."""
 
     __slots__ = ()
 
     def draw(self, ax: Axes | None = None, values: ArrayLike | None = None, **style: Any) -> Axes:
-        """Draw the graph: widths show weights, arrows one-way links, colours kinds of nodes or values.
+        """Draw the graph: line widths show weights, arrows show one-way links, colours show kinds of nodes or values.
 
         Parameters
         ----------
         ax : matplotlib axes, optional
-            By default pyplot's current ones, or those of a new figure.
+            By default pyplot's current axes, or the axes of a new figure.
         values : array_like (n,), optional
-            Colour of each node: whole numbers are classes, such as clusters; others are numbers of a colour map.
+            Values that colour the nodes: whole numbers are classes, such as clusters; other numbers use a colour map.
         **style
             Keywords of `matplotlib.axes.Axes.scatter` for the nodes, such as `cmap`, `vmin`, `s`.
 

@@ -1,4 +1,4 @@
-"""Entry points of installed packages, by which they announce parts of models and integrators."""
+"""Entry points, by which installed packages register oscillators, laws, couplings, families and integrators."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
 
 def announced(group: str) -> Mapping[str, EntryPoint]:
-    """Return the entry points of a group such as "synchain.integrators" by name; none is loaded."""
+    """Return name -> entry point for a group such as "synchain.integrators", without loading any."""
     return _announced(group, tuple(sys.path))
 
 
 @lru_cache(maxsize=8)
 def _announced(group: str, paths: tuple[str, ...]) -> Mapping[str, EntryPoint]:
-    """Return the entry points of a group, looked up again only if `sys.path` has changed."""
+    """Look up the entry points of a group; cached until `sys.path` changes."""
     from importlib.metadata import entry_points
 
     return {entry.name: entry for entry in entry_points(group=group)}

@@ -1,4 +1,4 @@
-"""Read a text as an expression of SymPy; subclasses of `Expressions` decide which names and functions there are."""
+"""Read a text as an expression of SymPy; subclasses of `Expressions` define the allowed names and functions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .checks import short_repr, suggestion
 from .reader import Algebra, NoMeaning, ParsedText
 
 EXPONENT, MAGNITUDE = 16, 1e100
-"""Largest exponent that is a number, largest constant; choices that keep expressions short and doubles finite."""
+"""Largest numeric exponent, and largest constant: choices that keep expressions short and doubles finite."""
 
 FUNCTIONS: Mapping[str, Any] = {
     "abs": sp.Abs, "acos": sp.acos, "acosh": sp.acosh, "asin": sp.asin, "asinh": sp.asinh, "atan": sp.atan,
@@ -21,23 +21,23 @@ FUNCTIONS: Mapping[str, Any] = {
     "exp": sp.exp, "floor": sp.floor, "log": sp.log, "max": sp.Max, "min": sp.Min, "sign": sp.sign, "sin": sp.sin, "sinh": sp.sinh,
     "sqrt": sp.sqrt, "tan": sp.tan, "tanh": sp.tanh,
 }  # fmt: skip
-"""The functions that a model may call, by their names in text; generated code has the same ones."""
+"""Name in text -> function that a model may call; generated code has the same functions."""
 
 
 def _expm1(x: sp.Expr) -> sp.Expr:
-    """exp(x) - 1 without a difference of near numbers; the product overflows only where exp(x) does."""
+    """Return exp(x) - 1 without cancellation, as a product that overflows only where exp(x) does."""
     return sp.tanh(x / 2) * (sp.exp(x) + 1)
 
 
 def _log1p(x: sp.Expr) -> sp.Expr:
-    """log(1 + x) = 2 log(w) = 2 asinh((w - 1/w)/2) with w = sqrt(1 + x): accurate near 0, no value below -1."""
+    """Return log(1 + x) = 2 asinh((w - 1/w)/2) with w = sqrt(1 + x): accurate near 0, undefined below -1."""
     return 2 * sp.asinh(x / (2 * sp.sqrt(1 + x)))
 
 
 def exprel(x: sp.Expr | float) -> sp.Expr:
-    """Return (exp(x) - 1)/x, which is 1 at x = 0, as an expression with a value and full digits everywhere.
+    """Return (exp(x) - 1)/x, with the value 1 at x = 0, as an expression that is accurate for all x.
 
-    Rates of ion channels have it: (x/(1 - exp(-x))) is 1/exprel(-x). Text calls it by the same name.
+    Rates of ion channels contain this function: x/(1 - exp(-x)) is 1/exprel(-x).  In text the name is ``exprel`` too.
 
     Parameters
     ----------
@@ -61,8 +61,9 @@ def exprel(x: sp.Expr | float) -> sp.Expr:
     --------
     Field : A vector field of such expressions.
     """
-    # With m = max(1, |x|), c = x/m and d = x - c: exp(x) - 1 = (exp(c) - 1) + exp(c) (exp(d) - 1); d is 0 for |x| <= 1.
-    # (exp(c) - 1)/c = exp(c/2) sinh(c/2)/(c/2) is a power series in c**2 (error 5e-17).  Both terms have one sign.
+    # Let m = max(1, |x|), c = x/m and d = x - c, so that |c| <= 1, and d = 0 for |x| <= 1.
+    # Use exp(x) - 1 = (exp(c) - 1) + exp(c) (exp(d) - 1).  Both terms have the same sign: no cancellation.
+    # (exp(c) - 1)/c = exp(c/2) sinh(c/2)/(c/2); sinh(y)/y is a power series in c**2, cut at an error of 5e-17.
     x = sp.sympify(x)
     m = sp.Max(1, sp.Abs(x))
     c = x / m
@@ -74,15 +75,15 @@ def exprel(x: sp.Expr | float) -> sp.Expr:
 
 
 def _modulo(x: sp.Expr, m: sp.Expr) -> sp.Expr:
-    """The remainder of x/m, with the sign of m."""
+    """Return the remainder of x/m, with the sign of m."""
     return x - m * sp.floor(x / m)
 
 
 COMPOSED: Mapping[str, Callable[..., sp.Expr]] = {"expm1": _expm1, "exprel": exprel, "log1p": _log1p, "mod": _modulo}
-"""Further functions that text may call, each as an expression of `FUNCTIONS`."""
+"""Further functions that text may call; each returns an expression of `FUNCTIONS`."""
 
 _COUNTS: Mapping[Any, int | None] = {sp.atan2: 2, _modulo: 2, sp.Max: None, sp.Min: None}
-"""Numbers of arguments other than one; None is any number from two."""
+"""Number of arguments of functions that do not take exactly one; None means two or more."""
 
 
 class _Refusal(Exception):
@@ -91,14 +92,14 @@ class _Refusal(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Expressions(Algebra[sp.Basic]):
-    """Expressions of SymPy; each operand is checked before it is used, so that no constant grows without bound.
+    """Algebra of SymPy expressions; operands are checked before each operation, so that constants stay bounded.
 
     A subclass defines the names and functions.
     """
 
     what: str  # the subject of errors
     deepest = 100
-    whole: ClassVar[float] = MAGNITUDE  # largest whole number, above and below a line
+    whole: ClassVar[float] = MAGNITUDE  # largest integer, also as numerator or denominator
     numbers: ClassVar[str] = "finite numbers"  # the condition on constants, for messages
     functions: ClassVar[Mapping[str, Callable[..., sp.Expr]]]  # by name, in the order of messages
 
@@ -110,7 +111,7 @@ class Expressions(Algebra[sp.Basic]):
             raise ValueError(str(refusal)) from None
         except NoMeaning as error:
             raise ValueError(f"{self.what}: {error.reason}") from None
-        except Exception as error:  # of SymPy, e.g. for a comparison that it cannot decide
+        except Exception as error:  # an error inside SymPy, e.g. for an undecidable comparison
             text, reason = short_repr(expression.text), " ".join(str(error).split())[:200]
             raise ValueError(f"{self.what}: {text} has no value: {reason or type(error).__name__}") from None
         steep = [e for e in value.atoms(sp.Pow) if e.exp.is_number and not abs(e.exp) <= EXPONENT]
@@ -121,11 +122,11 @@ class Expressions(Algebra[sp.Basic]):
         return value
 
     def pieces(self) -> str:
-        """List the pieces of expressions beside numbers, for messages."""
+        """List, for messages, the names and functions that expressions may contain."""
         raise NotImplementedError
 
     def function(self, name: str) -> Callable[..., sp.Expr] | None:
-        """Return the function of a name, None for an unknown one."""
+        """Return the function with a name; None for an unknown name."""
         return self.functions.get(name)
 
     def _known(self, name: str) -> Callable[..., sp.Expr]:
@@ -191,7 +192,7 @@ class Expressions(Algebra[sp.Basic]):
         return self._known(function)(*map(self.value, arguments))
 
     def value(self, e: sp.Basic) -> sp.Expr:
-        """Return an expression; NoMeaning for a condition, and for a constant that is infinite or too large."""
+        """Return the expression; NoMeaning if it is a condition, or a constant that is infinite or too large."""
         if not isinstance(e, sp.Expr):
             raise NoMeaning(f"found the condition {short_repr(e)}, which is no value; expected a value")
         large = next((number for number in _constants(e) if not self.fits(number)), None)
@@ -208,7 +209,7 @@ class Expressions(Algebra[sp.Basic]):
 
 
 def _constants(e: sp.Expr) -> Iterator[sp.Expr]:
-    """The constants at the top of an expression: itself, or its terms, factors, base and exponent that are constant."""
+    """Yield the constants of an expression: the expression, or the constant ones of its terms, factors or powers."""
     if e.is_number:
         yield e
     elif isinstance(e, sp.Mul | sp.Add | sp.Pow):

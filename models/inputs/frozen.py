@@ -9,7 +9,7 @@ T = TypeVar("T")
 
 
 class FrozenDict(Mapping[str, T], Generic[T]):
-    """A mapping that cannot change: reads like a dict and can be hashed, compared and pickled."""
+    """An immutable dict that can be hashed, compared and pickled."""
 
     __slots__ = ("_hash", "_items")
     _hash: int

@@ -1,4 +1,4 @@
-"""Wrong arguments of public functions, classes and methods are refused with the right ones; warnings name the user's line."""
+"""Refuse wrong arguments of public functions, classes and methods with a helpful message; warn at the user's line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .unsupported import unsupported
 
 
 def warn(message: str, kind: type[Warning] = RuntimeWarning) -> None:
-    """Warn at the line outside this package that called it."""
+    """Issue a warning that refers to the calling line outside this package."""
     package, level, frame = __name__.partition(".")[0], 1, currentframe()
     while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == package:
         level, frame = level + 1, frame.f_back
@@ -22,7 +22,7 @@ def warn(message: str, kind: type[Warning] = RuntimeWarning) -> None:
 
 
 def called_from_outside(*modules: str) -> bool:
-    """Return True if the caller of this function was called from outside the package, directly or through these modules."""
+    """Return whether the caller's caller, skipping `modules`, is outside this package."""
     here = currentframe()
     frame = here.f_back.f_back if here and here.f_back else None
     while frame is not None and frame.f_globals.get("__name__") in (__name__, *modules):
@@ -31,7 +31,7 @@ def called_from_outside(*modules: str) -> bool:
 
 
 def public(value: Any, package: str) -> Any:
-    """Make a function or class of a package's front refuse wrong arguments, unknown keywords with a suggestion."""
+    """Make a public function or class refuse wrong arguments, with a suggestion for an unknown keyword."""
     if isinstance(value, type):
         init = vars(value).get("__init__")
         if isfunction(init) and not hasattr(init, "__wrapped__"):
@@ -49,7 +49,7 @@ def check_methods(kind: type) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Arguments:
-    """The arguments of a function."""
+    """The argument list of a function."""
 
     name: str  # the function's name, the class's for `__init__`
     positional: tuple[str, ...]  # arguments that may be given by position, `self` among them
@@ -77,7 +77,7 @@ class _Arguments:
         )
 
     def refusal(self, count: int, keywords: Collection[str]) -> str | None:
-        """Say why `count` positional arguments and these keywords do not fit; None if they do."""
+        """Explain why `count` positional arguments and `keywords` do not fit; None if they fit."""
         if not keywords and count in self.enough:
             return None
         strange = next((name for name in keywords if name not in self.names and not self.any_name), None)
@@ -112,7 +112,7 @@ class _Arguments:
 
 @cache
 def _checked(function: Callable[..., Any], package: str) -> Callable[..., Any]:
-    """The function with a better message if its arguments do not fit; they are compared only after a TypeError."""
+    """Wrap a function so that a TypeError for wrong arguments gets a better message; correct calls cost nothing."""
     accepted = _Arguments.of(function)
 
     @wraps(function)

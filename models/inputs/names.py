@@ -1,4 +1,4 @@
-"""Names of states and parameters of single nodes, "x_2", and links, "k_1_2", and the names that results reserve."""
+"""Names of states and parameters of one node, "x_2", or one link, "k_1_2", and names reserved by results."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 _DIGITS = 9
-"""Most digits of the number of a node."""
+"""Most digits of the number of a node in a name."""
 
 TAKEN = frozenset(
     {"atol_used", "cell", "component", "drive_phase", "end", "end_time", "ended_early", "integrator", "method_steps", "methods",
@@ -21,7 +21,7 @@ ATTRIBUTES = frozenset(
     {"animate", "as_dict", "belongs_to", "data", "integrators", "isel", "kind", "link", "message", "name", "names", "plot", "restore", "save", "scene",
      "sel", "state", "states", "stepped", "success", "summary", "to_dataframe", "to_xarray"}
 )  # fmt: skip
-"""Attributes of results and of their data, which would hide variables of these names."""
+"""Attributes of results and of their data; a variable with such a name would be hidden."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class NodeName:
 
     @classmethod
     def parse(cls, name: str) -> NodeName | None:
-        """Return the parts of a name such as "x_2"; None if the text is no such name."""
+        """Parse a name such as "x_2"; None if the text is no such name."""
         base, _, number = name.rpartition("_")
         counts = number.isascii() and number.isdecimal() and number[0] != "0" and len(number) <= _DIGITS
         return cls(base, int(number) - 1) if base and counts else None
@@ -47,12 +47,12 @@ class LinkName:
     """The name of a parameter of one link: "k_1_2" is k where node 1 feels node 2."""
 
     base: str  # the parameter: "k" of "k_1_2"
-    target: int  # the two ends, counted from 0: 0 and 1 of "k_1_2"
+    target: int  # the node that feels `source`; counted from 0: 0 and 1 of "k_1_2"
     source: int
 
     @classmethod
     def parse(cls, name: str) -> LinkName | None:
-        """Return the parts of a name such as "k_1_2"; None if the text is no such name."""
+        """Parse a name such as "k_1_2"; None if the text is no such name."""
         outer = NodeName.parse(name)
         inner = None if outer is None else NodeName.parse(outer.base)
         return None if outer is None or inner is None else cls(inner.base, inner.index, outer.index)
@@ -62,7 +62,7 @@ class LinkName:
 
 
 def expect_free(what: str, names: Iterable[str], more: Collection[str] = ()) -> None:
-    """Raise ValueError if a result has one of the names for something else: one of `TAKEN`, or of `more`."""
+    """Raise ValueError if one of `names` is reserved by results: in `TAKEN` or `more`."""
     for name in names:
         if name in TAKEN or name in more:
             raise ValueError(f"{what}: found the name {name!r}, which results have for something else; rename it")

@@ -1,4 +1,4 @@
-"""Options of graph families: their types and canonical form; a command line gives them as text."""
+"""Convert options of graph families, which may be text from a command line, to canonical form."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ _INTEGER = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 
 
 def as_options(options: Mapping[str, Any]) -> Options:
-    """Return options as a topology stores them: sorted by name, lists as tuples."""
+    """Convert options to the form that a topology stores: sorted by name, lists as tuples."""
     return tuple((key, tuple(v) if isinstance(v, list) else v) for key, v in sorted(options.items()))
 
 
 def integer_option(what: str, value: object, low: int, high: int | None = None) -> int:
-    """Return a whole number, given as such or as text.
+    """Convert a whole number or its text to an int.
 
     Parameters
     ----------
     what : str
-        The thing that the number is for, such as ``"seed"``.
+        Name of the option in messages, such as ``"seed"``.
     value : object
         The value of the option; a command line gives text.
     low, high : int, optional
-        The range, both ends in it.
+        The closed range of allowed numbers.
 
     Returns
     -------
@@ -46,7 +46,7 @@ def integer_option(what: str, value: object, low: int, high: int | None = None) 
     TypeError
         If the value is no whole number.
     ValueError
-        If it is out of range.
+        If the number is out of range.
     """
     if isinstance(value, str) and _INTEGER.fullmatch(value.strip()):
         value = int(value)
@@ -59,11 +59,11 @@ def integers_option(what: str, value: object, low: int) -> tuple[int, ...]:
     Parameters
     ----------
     what : str
-        The thing that the numbers are for, such as ``"shape"``.
+        Name of the option in messages, such as ``"shape"``.
     value : object
         The value of the option.
     low : int
-        The smallest number that is allowed.
+        The smallest allowed number.
 
     Returns
     -------
@@ -97,9 +97,9 @@ def probability_option(what: str, value: object) -> str:
     Parameters
     ----------
     what : str
-        The thing that the probability is for, such as ``"p"``.
+        Name of the option in messages, such as ``"p"``.
     value : object
-        A number or a text; a float means its shortest decimal.
+        A number or a text; a float stands for its shortest decimal.
 
     Returns
     -------
@@ -111,7 +111,7 @@ def probability_option(what: str, value: object) -> str:
     TypeError
         If the value is no number.
     ValueError
-        If it is not rational, or not from 0 to 1.
+        If the number is not rational, or not from 0 to 1.
     """
     chance = rational(value, what)
     if not 0 <= chance <= 1:

@@ -1,12 +1,12 @@
 """Plug-ins: Python files that assign one value, an oscillator, a friction law, a coupling or a family of graphs.
 
-Besides the files of this package there are entry points of installed packages (groups ``synchain.oscillators``,
-``synchain.frictions``, ``synchain.couplings``, ``synchain.topologies``), and files anywhere, named by a path that ends in
-``.py``.  Such a file is run only after `allow_code` has been called for it: a scene, which is data, never runs code by
-itself.
+There are three sources of plug-ins: files of this package, entry points of installed packages (groups
+``synchain.oscillators``, ``synchain.frictions``, ``synchain.couplings``, ``synchain.topologies``), and files anywhere,
+named by a path that ends in ``.py``.  A file named by a path is run only after `allow_code` was called with that path,
+so a scene alone, which is data, never runs code.
 
-A file outside the package is identified by its text, so that an edited file is another model.  Its imports are not
-compared: write a model in one file.
+A file outside the package is identified by its text: an edited file is another model.  Files that a plug-in imports are
+not compared, so write a model in one file.
 """
 
 from __future__ import annotations
@@ -28,31 +28,31 @@ from .checks import check_path, check_text, short_repr, suggestion
 from .entry_points import announced
 
 PACKAGE = "synchain.models"
-"""The package whose folders hold the plug-ins that are shipped."""
+"""The package whose folders contain the shipped plug-ins."""
 
 
 @dataclass(frozen=True, slots=True)
 class PluginKind:
-    """A kind of plug-in: where its files are, and which value they assign."""
+    """A kind of plug-in: the folder of its files, and the type of the value that a file assigns."""
 
-    name: str  # the kind in messages, "oscillator"; in capitals, the name that a file gives to its value: OSCILLATOR
-    folder: str  # the folder of `synchain.models` with the shipped files; it names the group of entry points too
-    # returns the types of the value; a call, since lists of plug-ins must not load SymPy
+    name: str  # the kind in messages, "oscillator"; in capitals, the variable that a file assigns: OSCILLATOR
+    folder: str  # the folder of `synchain.models` with the shipped files, and the name of the group of entry points
+    # returns the allowed types of the value; a function, because lists of plug-ins must not load SymPy
     types: Callable[[], tuple[type, ...]] = field(compare=False, repr=False)
     example: str = field(compare=False, repr=False)  # the right-hand side of the assignment, for messages
-    # further names of shipped files; a file of that name takes precedence
+    # synonym -> name of a shipped file; a file with the synonym's name takes precedence
     also: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
-    # names of other things that are close to a shipped file; they serve suggestions only
+    # other word -> name of a related shipped file, for suggestions only
     near: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
-    # what else a user may give, for the message that refuses an unknown name
+    # alternatives to a name, for the error message on an unknown name
     otherwise: str = field(default="", compare=False, repr=False)
 
 
 class OwnFile(str):
     """The name of a plug-in file outside the package, as the user wrote it, with the path and the digest of its text.
 
-    Two names are equal if name, path and digest are equal; none equals a plain text.  So a cache by name holds the
-    value of one text of one file.
+    Two such names are equal if name, path and digest are equal; no such name equals a plain str.  A cache keyed by
+    names therefore stores one value for each text of each file.
     """
 
     __slots__ = ("digest", "path")
@@ -81,7 +81,7 @@ class OwnFile(str):
 
 
 _modules: dict[tuple[str, str, str], ModuleType] = {}
-"""Kind, path and digest -> the module of a file outside the package; scenes keep the model that they were made with."""
+"""(kind, path, digest) -> module of a file outside the package; a scene keeps its model even if the file changes."""
 
 _allowed: set[Path] = set()
 
@@ -94,7 +94,7 @@ def names(kind: PluginKind) -> tuple[str, ...]:
 def allow_code(*paths: str | Path) -> None:
     """Allow files outside the package to be run as plug-ins, from now on.
 
-    Afterwards their paths are names: Scene(friction="./my_law.py").  Only allow what you have read.
+    Afterwards a path can be used as a name: Scene(friction="./my_law.py").  Allow only files that you have read.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def allow_code(*paths: str | Path) -> None:
     Raises
     ------
     ValueError
-        If one is no file that ends in .py.
+        If a path is not a file that ends in .py.
     """
     for path in paths:
         file = check_path("plug-in", path)
@@ -119,9 +119,9 @@ def allowed_code() -> tuple[str, ...]:
 
 
 def named(kind: PluginKind, name: str) -> str:
-    """Return the canonical name of a plug-in: an `OwnFile` of the present text for a path, the file's name for a synonym.
+    """Return the canonical name of a plug-in: an `OwnFile` of the current text for a path, the file name for a synonym.
 
-    An `OwnFile` is returned unchanged, even if its file has been edited or removed since.
+    An `OwnFile` is returned unchanged, even if the file was edited or removed later.
     """
     if isinstance(name, OwnFile):
         return name
@@ -156,7 +156,7 @@ def is_shipped(kind: PluginKind, name: str) -> bool:
 
 @lru_cache(maxsize=512)
 def _value(kind: PluginKind, name: str, module: ModuleType, where: str) -> Any:
-    """The value of a module, under the name of its plug-in; ValueError if it assigns none."""
+    """Return the value of a module with the name of the plug-in; ValueError if the module assigns no value."""
     variable = kind.name.upper()
     value = getattr(module, variable, None)
     if not isinstance(value, kind.types()):
@@ -164,7 +164,7 @@ def _value(kind: PluginKind, name: str, module: ModuleType, where: str) -> Any:
         raise ValueError(
             f"{where}: found {found}; expected {variable} = {kind.example}; see: synchain new {kind.name} NAME"
         )
-    if not hasattr(value, "summary"):  # rates and potentials of links have no name: a scene file holds them as tables
+    if not hasattr(value, "summary"):  # rates and potentials of links have no name
         return value
     # The summary is the first paragraph of the docstring, without its full stop.
     summary = " ".join((inspect.getdoc(module) or "").partition("\n\n")[0].split()).removesuffix(".")
@@ -173,7 +173,7 @@ def _value(kind: PluginKind, name: str, module: ModuleType, where: str) -> Any:
 
 
 def part(what: str, value: object) -> str:
-    """Return the name of a part of the model as text; a path to a file of code may be long."""
+    """Return the name of an oscillator, law, coupling or family as text; the limit allows long paths."""
     return check_text(what, value, 1000 if isinstance(value, str) and ".py" in value else 200)
 
 
@@ -201,7 +201,7 @@ def _group(kind: PluginKind) -> str:
 
 
 def _installed(kind: PluginKind, name: str) -> tuple[ModuleType, str]:
-    """The module of an entry point, and how messages call it."""
+    """Return the module of an entry point, and its name in messages."""
     entry = announced(_group(kind))[name]
     where = f"{kind.name} {name!r} of the entry point {entry.value!r}"
     try:
@@ -214,7 +214,7 @@ def _installed(kind: PluginKind, name: str) -> tuple[ModuleType, str]:
 
 
 def _text(kind: PluginKind, name: str, path: Path) -> bytes:
-    """The text of a file that `allow_code` has allowed; ValueError if it is not allowed or cannot be read."""
+    """Read a file that `allow_code` has allowed; ValueError if the file is not allowed or cannot be read."""
     if not path.is_file():
         raise ValueError(f"{kind.name} {name!r}: no such file: {path}; expected a .py file; check the path")
     if path not in _allowed:
@@ -231,7 +231,7 @@ def _text(kind: PluginKind, name: str, path: Path) -> bytes:
 
 
 def _module(kind: PluginKind, own: OwnFile, text: bytes | None = None) -> ModuleType:
-    """The module of a file of code, run once for each text."""
+    """Return the module of a plug-in file; each text of the file is run once."""
     key = (kind.name, own.path, own.digest)
     if key in _modules:
         return _modules[key]
@@ -253,7 +253,7 @@ def _module(kind: PluginKind, own: OwnFile, text: bytes | None = None) -> Module
 
 
 def _located(error: Exception, file: str, what: str = "") -> ValueError:
-    """A ValueError with the innermost line of `file` in an error's traceback, of any file if `file` is empty."""
+    """Make a ValueError that names the innermost line of `file` in a traceback; "" means any file."""
     frames = traceback.extract_tb(error.__traceback__)
     lines = [(frame.filename, frame.lineno) for frame in frames if file in ("", frame.filename)]
     if isinstance(error, SyntaxError) and error.filename and file in ("", error.filename):

@@ -1,4 +1,4 @@
-"""Exact rational numbers and square tables of them, from lists, matrices, text and files."""
+"""Read exact rational numbers, and square tables of rational numbers, from lists, matrices, text and files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .checks import check_path, check_printable
 FILE_LIMIT = 32 * 2**20
 """Largest matrix file in bytes, a choice."""
 ROWS = 2000
-"""Most rows of a matrix, a choice; larger graphs are read as lists of links."""
+"""Most rows of a matrix, a choice; larger graphs can be read as lists of edges."""
 
 _TEXT = re.compile(r"[+-]?(?:\d+/0*[1-9]\d*|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)", re.ASCII)
 _BY_ZERO = re.compile(r"[+-]?\d+/0+", re.ASCII)
@@ -48,7 +48,7 @@ def rational(entry: Any, where: str) -> Fraction:
 
 @lru_cache(maxsize=4096)
 def _number(text: str) -> Fraction | None:
-    """The number of a text, None if it cannot be read."""
+    """Read a number; None if the text is no number."""
     return Fraction(text) if len(text) <= _LONGEST and _TEXT.fullmatch(text) else None
 
 
@@ -65,7 +65,7 @@ def _from_text(text: str, where: str) -> Fraction:
 
 
 def rational_rows(rows: Any, name: str) -> list[list[Fraction]]:
-    """Return a square table of exact numbers."""
+    """Convert a square table to exact numbers."""
     return [[_entry(entry, name, i, j) for j, entry in enumerate(line)] for i, line in enumerate(square(rows, name))]
 
 
@@ -75,15 +75,15 @@ def _entry(entry: object, name: str, i: int, j: int) -> Fraction:
 
 
 def total(numbers: Iterable[Fraction]) -> Fraction:
-    """Add fractions over one common denominator and reduce once, which is faster for many of them."""
+    """Add fractions over one common denominator and reduce once; faster for many fractions."""
     terms = list(filter(None, numbers))
     below = lcm(*(x.denominator for x in terms))
     return Fraction(sum(x.numerator * (below // x.denominator) for x in terms), below)
 
 
 def square(rows: Any, name: str) -> list[list[Any]]:
-    """Return the rows of a square table with unchanged entries."""
-    # SymPy lists a matrix entry by entry
+    """Return the rows of a square table with unchanged entries; ValueError if the table is not square."""
+    # A SymPy matrix iterates over its entries, not its rows.
     symbolic = hasattr(rows, "tolist") and not hasattr(rows, "dtype")
     listed = rows.tolist() if symbolic else rows
     if isinstance(listed, (str, bytes)) or not isinstance(listed, Iterable) or hasattr(rows, "tocoo"):
@@ -115,7 +115,7 @@ def _too_large(name: str) -> ValueError:
 
 
 def file_text(path: str | Path, what: str, expected: str = "a text file") -> tuple[str, str]:
-    """Return the text of a small file, and the name of the file."""
+    """Read a file of at most FILE_LIMIT bytes; return its text and its name."""
     file = check_path(what, path)
     check_printable(what, file.name)
     if not file.exists():
@@ -134,7 +134,7 @@ def file_text(path: str | Path, what: str, expected: str = "a text file") -> tup
 
 
 def parse_rows(text: str, name: str) -> list[list[str]]:
-    """Return the entries of a matrix text, with blanks or commas between them.
+    """Split the text of a matrix into rows of entries, separated by blanks or commas.
 
     Comments begin with `#`; empty lines are skipped.
     """

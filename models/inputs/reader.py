@@ -1,8 +1,8 @@
-"""Read expressions of users by a whitelist over `ast`; no text is ever run.
+"""Read the user's expressions with a whitelist of `ast` nodes; no text is run.
 
-`parse` turns a text into a `ParsedText`; `ParsedText.evaluate` walks its syntax tree and asks an
-`Algebra` for the value of every number, name and operation: floats, exact numbers, sums of cosines,
-symbolic weights and graphs are algebras.
+`parse` turns a text into a `ParsedText`.  `ParsedText.evaluate` walks the syntax tree, and an `Algebra`
+computes the value of every number, name and operation.  There are algebras of floats, exact numbers,
+sums of cosines, symbolic weights and graphs.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _PARTNERS: Mapping[str, str] = {")": "(", "]": "["}
 
 
 class NoMeaning(Exception):
-    """An operation, name or call that the expressions of an algebra may not contain."""
+    """Raised by an algebra for an operation, name or call that it does not support."""
 
     def __init__(self, reason: str = "") -> None:
         super().__init__(reason)
@@ -41,11 +41,11 @@ class NoMeaning(Exception):
 
 
 class Algebra(Generic[V]):
-    """The meaning of expressions: the values of numbers, names, operations and calls, and refusals.
+    """Compute the values, of any type V, of numbers, names, operations and calls; raise errors for the others.
 
-    Values are of any type V.  Every method that a subclass leaves out raises NoMeaning, which the
-    reader turns into `refuse` with the piece of the expression.  A method that may take long or grow
-    large checks the sizes of its operands first.
+    A method that a subclass does not define raises NoMeaning; the reader then calls `refuse` with the
+    piece of the expression.  A method whose result may be slow or large checks the sizes of its operands
+    first.
 
     Attributes
     ----------
@@ -64,11 +64,11 @@ class Algebra(Generic[V]):
         raise NoMeaning
 
     def number(self, value: int | float) -> V:
-        """The value of a literal that is not negative."""
+        """Return the value of a literal number, which is never negative."""
         raise NoMeaning
 
     def name(self, name: str) -> V:
-        """The value of a name."""
+        """Return the value of a name."""
         raise NoMeaning
 
     def positive(self, value: V) -> V:
@@ -104,39 +104,42 @@ class Algebra(Generic[V]):
         raise NoMeaning
 
     def whole_power(self, base: V, exponent: int) -> V:
-        """base ** exponent, the exponent a literal whole number."""
+        """base ** exponent, with a literal integer as exponent."""
         return self.power(base, self.number(exponent))
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[Any] | None]:
-        """Return an algebra for each argument of a call, None for one that is passed on as text; NoMeaning for a wrong call."""
+        """Return an algebra for each argument of a call, None for an argument passed on as text.
+
+        Raise NoMeaning for an unknown function or a wrong number of arguments.
+        """
         raise NoMeaning
 
     def call(self, function: str, arguments: Sequence[Any], options: Mapping[str, str]) -> V:
-        """The value of a call; `options` are the keyword arguments as text."""
+        """Return the value of a call; `options` are the keyword arguments as text."""
         raise NoMeaning
 
     def compare(self, sign: str, a: V, b: V) -> V:
-        """A condition a < b, a <= b, a > b, a >= b, a == b or a != b, by its sign."""
+        """Return the condition `a sign b`, where `sign` is one of < <= > >= == !=."""
         raise NoMeaning
 
     def junction(self, word: str, conditions: Sequence[V]) -> V:
-        """All conditions ("and") or any of them ("or")."""
+        """Join conditions by `word`, "and" or "or"."""
         raise NoMeaning
 
     def contrary(self, condition: V) -> V:
-        """The condition "not ..."."""
+        """Return the condition "not condition"."""
         raise NoMeaning
 
     def choice(self, condition: V, value: V, otherwise: V) -> V:
-        """The value "value if condition else otherwise"."""
+        """Return "value if condition else otherwise"."""
         raise NoMeaning
 
 
 class Arithmetic(Algebra[V]):
-    """An algebra whose values Python adds and multiplies; sums and products are checked."""
+    """An algebra of values with Python's + and *; the results are checked."""
 
     def checked(self, value: Any) -> V:
-        """The value of an operation, if it is not too large."""
+        """Return the result of an operation; raise an error if it is too large."""
         raise NoMeaning
 
     def positive(self, value: V) -> V:
@@ -240,14 +243,14 @@ class ParsedText:
         return algebra.call(function, arguments, dict(zip(names, values, strict=True)))
 
     def _written(self, node: ast.expr) -> str:
-        """The text of a piece in the form of a command line: (3, 4) as 3,4; 1 / 10 as 1/10; digits unchanged."""
+        """Return the text of a piece in the form of a command line: (3, 4) as 3,4 and 1 / 10 as 1/10."""
         if isinstance(node, ast.Tuple):
             return ",".join(self._written(element) for element in node.elts)
         return (ast.get_source_segment(self.text, node) or "").replace(" ", "")
 
 
 def _called(node: ast.expr) -> str | None:
-    """The name of a called function: f, nodes.mean or nodes[3]; None for any other expression."""
+    """Return the name of a called function, such as f, nodes.mean or nodes[3]; None for any other expression."""
     match node:
         case ast.Name(id=name):
             return name
@@ -259,7 +262,7 @@ def _called(node: ast.expr) -> str | None:
 
 
 def parse(text: str) -> ParsedText | None:
-    """Return the syntax tree of a text, None if it is no expression of Python."""
+    """Parse a text; None if it is no Python expression."""
     stripped = text.strip()
     try:
         with warnings.catch_warnings():
@@ -270,7 +273,7 @@ def parse(text: str) -> ParsedText | None:
 
 
 def unpaired(text: str) -> str:
-    """Describe the first bracket without a partner, " with a ( that is not closed"; return "" if there is none."""
+    """Describe the first unpaired bracket, as " with a ( that is not closed"; "" if all are paired."""
     waiting: list[str] = []
     for sign in text:
         if sign in _PARTNERS.values():
@@ -281,6 +284,6 @@ def unpaired(text: str) -> str:
 
 
 def stray_character(text: str) -> str:
-    """Return the first character that no arithmetic contains, "" if there is none."""
+    """Return the first character that no arithmetic expression contains; "" if there is none."""
     arithmetic = _ARITHMETIC.match(text)
     return text[arithmetic.end() :][:1] if arithmetic else text[:1]

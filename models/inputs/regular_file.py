@@ -1,4 +1,4 @@
-"""Opening of regular files alone: a pipe or a device is refused before it can block the program."""
+"""Open regular files only: refuse a pipe or a device, which could block the program."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ def open_regular(
 ) -> FileIO:
     """Open a regular file without buffering.
 
-    The kind is tested on the open descriptor, so that a file exchanged in between is not read.
+    The kind of file is tested on the open descriptor, so that exchanging the file meanwhile has no effect.
     """
     flags |= os.O_RDWR if writing else os.O_RDONLY
     flags |= getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
     file = Path(path)
-    if folder is None and file.is_dir():  # Windows cannot open one
+    if folder is None and file.is_dir():  # Windows cannot open a folder
         raise IsADirectoryError(f"{file} is a folder; expected a file: name the file in it")
     try:
         descriptor = os.open(path, flags, dir_fd=folder)

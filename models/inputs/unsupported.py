@@ -1,4 +1,4 @@
-"""Features of networks in the literature that this program lacks, with programs that have them, by keyword."""
+"""Keyword -> feature in the literature that this program lacks, with programs that have the feature."""
 
 from __future__ import annotations
 
@@ -29,5 +29,5 @@ _WORDS: Mapping[str, str] = {
 
 
 def unsupported(name: object) -> str:
-    """Return the sentence on an unsupported feature by its keyword; "" for other words."""
+    """Return the sentence on an unsupported feature with this keyword; "" for any other word."""
     return _WORDS.get(name, "") if isinstance(name, str) else ""

@@ -1,4 +1,4 @@
-"""Words of scene files with a fixed meaning, as enumerations."""
+"""Base class of enumerations of the fixed words in scene files."""
 
 from __future__ import annotations
 
@@ -16,5 +16,5 @@ class Word(StrEnum):
 
     @classmethod
     def parse(cls, what: str, value: object) -> Self:
-        """Return the word of a text."""
+        """Return the member with this text; an error lists the valid words."""
         return cls(check_choice(what, value, tuple(cls)))

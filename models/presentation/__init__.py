@@ -1,1 +1,1 @@
-"""Equations as LaTeX and as plain text. Knows no scene."""
+"""Equations as LaTeX, plain text and MathML. Independent of scenes."""

@@ -1,8 +1,8 @@
-"""Equations as LaTeX, as plain text, and as a dictionary fit for JSON.
+"""Write equations as LaTeX, as plain text, and as a dictionary for JSON.
 
-Where an equation contains one of the friction laws, the law is written as f and defined once below,
-in the letters of Marszal et al., Eur. Phys. J. Special Topics (2016), eqs. 3-6: chi for the
-displacement and tau for the time.
+A friction law in an equation is written as f(w), and f is defined once below the equations.  Equations
+with a friction law use the letters of Marszal et al., Eur. Phys. J. Special Topics (2016), eqs. 3-6: chi
+for the displacement and tau for the time.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..mechanics.oscillator import FRICTION
 from .writer import ExpressionWriter, Latex, Style, Text
 
 LARGEST = 6
-"""Networks of more nodes are written once, for node i, instead of node by node; a choice."""
+"""Most nodes of a network written node by node, a choice; larger networks are written once, for node i."""
 
 EXPECTED = "equations, such as scene.equations"
 
@@ -60,11 +60,10 @@ def text(equations: Equations) -> str:
 
 
 def as_dict(equations: Equations) -> dict[str, object]:
-    """Return names, right-hand sides and derivatives as text that SymPy reads, and the digest.
+    """Return names, right-hand sides, derivatives and digest; expressions are text that SymPy reads.
 
-    `jacobian` has the non-zero entries only, under keys such as "v_1,x_1" (row, column); time is
-    called t.  Where links have inertia `mass` has the entries of M in M d(state)/dt = rhs in the
-    same way.
+    `jacobian` holds the non-zero entries, with keys such as "v_1,x_1" (row, column).  Time is called t.
+    If links have inertia, `mass` holds the non-zero entries of M in M d(state)/dt = rhs, with the same keys.
     """
     state = equations.state
     entries, mass = equations.jacobian().items(), equations.mass()
@@ -80,7 +79,7 @@ def as_dict(equations: Equations) -> dict[str, object]:
 
 
 def lines(equations: Equations, style: Style) -> Iterator[str]:
-    """Yield equation by equation, then the laws, then the meaning of the indices of a large network."""
+    """Yield the equations, then the friction laws, then for a large network the meaning of the indices."""
     network = _NetworkText(_in_slip(equations), style)
     generic = network.equations.n > LARGEST and not network.equations.mixed
     if generic:
@@ -96,7 +95,7 @@ def lines(equations: Equations, style: Style) -> Iterator[str]:
 
 
 def _in_slip(equations: Equations) -> Equations:
-    """Return equations with set-valued friction in slip, without the modes."""
+    """Return the equations of slip for set-valued friction; stick modes are left out."""
     if not equations.sticks:
         return equations
 
@@ -113,14 +112,14 @@ def _in_slip(equations: Equations) -> Equations:
 
 @dataclass(frozen=True, slots=True)
 class _NamedNode:
-    """A node's right-hand side with its friction law as f(w), and the law; None if it is written in place."""
+    """The right-hand side of a node with its friction law as f(w), and the law; None if the law is written out."""
 
     rhs: tuple[sp.Expr, ...]
     law: sp.Expr | None
 
     @classmethod
     def of(cls, node: Node) -> _NamedNode:
-        """Name the law of a node, unless a state or parameter has the letter of f or of its argument."""
+        """Replace the law of a node by f(w), unless a state or parameter has the name f or w."""
         taken = {s.name for s in (*node.state, *node.parameters)}
         if node.law is not None and not taken & {SLIDING.name, "f"}:
             rhs = tuple(_with_law(e, node.law, node.state) for e in node.rhs)
@@ -130,9 +129,9 @@ class _NamedNode:
 
 
 def _with_law(e: sp.Expr, law: sp.Expr, state: tuple[sp.Symbol, ...]) -> sp.Expr:
-    """Return the expression with (factor) law(w) written as (factor) f(w).
+    """Replace (factor) law(w) in an expression by (factor) f(w).
 
-    w is the first sum with a state for which that works.
+    Try each sum with a state as w; take the first for which the replacement succeeds.
     """
     sums = sorted((s for s in e.atoms(sp.Add) if s != e and s.has(*state)), key=sp.default_sort_key)
     for w in sums:
@@ -150,9 +149,9 @@ class _NetworkText:
     def __init__(self, equations: Equations, style: Style) -> None:
         self.equations, self.style = equations, style
         self.named = tuple(_NamedNode.of(node) for node in equations.nodes)
-        # parameters of the templates with a value for each node
+        # Parameters with a value for each node.
         self.varied = [sp.Symbol(name, real=True) for name in equations.varied]
-        # the layers of links, with the letter of their weights: G, of several layers G_1, G_2, …
+        # Layers of links with the letters of their weights: G for one layer, G_1, G_2, … for several.
         edges = equations.edges
         self.layers = [(edge, "G" if len(edges) == 1 else f"G_{k}") for k, edge in enumerate(edges, start=1)]
 
@@ -174,9 +173,9 @@ class _NetworkText:
             yield f"{self._left(writer, c, i)} = {writer.total(terms)}"
 
     def _left(self, writer: ExpressionWriter, c: int, i: int) -> str:
-        """Return the left side: the rate of component c of node i, and the masses times rates that links add.
+        """Write the left side: the rate of component c of node i, plus masses of links times rates.
 
-        The rate is written chi'' if the component is the velocity of chi.
+        The rate of a velocity is written as a second derivative, chi''.
         """
         equations, states = self.equations, self.equations.symbols(i)
         row = [e.xreplace(equations.at_node(i)) for e in _masses(equations.node_at(i), c)]
@@ -198,14 +197,14 @@ class _NetworkText:
         return f"{left} {'- ' + more[1:] if more.startswith('-') else '+ ' + more}"
 
     def generic(self) -> Iterator[str]:
-        """Yield the equations of node i, its links as a sum over j."""
+        """Yield the equations of node i for any i; the links are a sum over j."""
         equations, style, (named, *_) = self.equations, self.style, self.named
         node = equations.node
         states = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in node.state)
         here = dict(zip(node.state, states, strict=True))
         weights = {name: sp.Symbol(f"{name}_ij", real=True) for _, name in self.layers}
 
-        # letters: states and parameters of node i, values of links ij, states and parameters of node j
+        # Choose letters for states and parameters of node i, values of the link ij, states and parameters of node j.
         letters = self._letters(named, states, "i") | {s: style.letter(s.name, "i") for s in self.varied}
         numbered = tuple(sp.Symbol(name, real=True) for name in equations.numbered)
         letters |= {s: style.letter(s.name, "ij") for s in numbered}
@@ -225,7 +224,7 @@ class _NetworkText:
                     inside = (weight, *ends, *(s for s, _ in edge.theirs), *numbered)
                     summed = _summed(edge.rhs[c].xreplace({edge.weight: weight}), inside, writer)
                     line = line + summed if line != "0" else summed.removeprefix(" + ").lstrip()
-                if edge.inertia:  # the links add masses times rates to the left side
+                if edge.inertia:  # links with inertia add masses times rates to the left side
                     masses = (e for block in edge.inertia for e in block[c])
                     term = sp.factor(sp.Add(*(e * _rate(s) for e, s in zip(masses, ends, strict=True))))
                     if term != 0:
@@ -235,7 +234,7 @@ class _NetworkText:
             yield f"{left} = {line}"
 
     def laws(self) -> Iterator[str]:
-        """Yield the friction law of each kind of node; i is the node whose parameters it has."""
+        """Yield the definition of f for each kind of node; in it, i is the node with the law's parameters."""
         for kind, named in enumerate(self.named):
             if (law := named.law) is None:
                 continue
@@ -250,7 +249,7 @@ class _NetworkText:
             yield f"{writer.write(FRICTION(SLIDING))} = {writer.write(law)}{about}"
 
     def legend(self) -> str:
-        """Return the range of the indices, and the meaning of the weights."""
+        """Explain the range of the indices and the meaning of the weights."""
         equations, style, meaning = self.equations, self.style, ""
         linked = (layer for layer in equations.layers if layer.links)
         for layer, (_, name) in zip(linked, self.layers, strict=True):
@@ -263,9 +262,9 @@ class _NetworkText:
     def _letters(
         self, named: _NamedNode, symbols: tuple[sp.Symbol, ...], index: str, i: int = 0
     ) -> dict[sp.Symbol, str]:
-        """Return the written forms of the states of node i and of the time.
+        """Map the states of node i and the time to letters.
 
-        They are chi and tau beside a friction law; velocities have a prime.
+        With a friction law these are chi and tau.  A velocity is its coordinate with a prime.
         """
         node, style = self.equations.node_at(i), self.style
         plain = named.law is None or {"chi", "tau"} & {s.name for s in (*node.state, *node.parameters)}
@@ -278,7 +277,7 @@ class _NetworkText:
 
 
 def _masses(node: Node, c: int) -> tuple[sp.Expr, ...]:
-    """Return row c of the mass matrix of a node, empty if it is a row of the identity."""
+    """Return row c of the mass matrix of a node; empty for a row of the identity."""
     row = node.inertia[c] if node.inertia else ()
     return () if all(e == sp.Integer(k == c) for k, e in enumerate(row)) else row
 
@@ -288,19 +287,19 @@ def _rate(state: sp.Symbol) -> sp.Symbol:
 
 
 def _with_rates(writer: ExpressionWriter, states: Sequence[sp.Symbol]) -> ExpressionWriter:
-    """Return a writer that writes the rates of states too, with a prime."""
+    """Add the rates of states, written with a prime, to the letters of a writer."""
     rates = {_rate(s): writer.write(s) + "'" for s in states}
     return replace(writer, letters={**writer.letters, **rates}, variables=writer.variables | set(rates))
 
 
 def _massive(row: Sequence[sp.Expr], states: Sequence[sp.Symbol], writer: ExpressionWriter) -> str:
-    """Return a row of masses times rates."""
+    """Write a row of the mass matrix times the rates."""
     terms = [e * _rate(s) for e, s in zip(row, states, strict=True) if e != 0]
     return _with_rates(writer, states).total(terms)
 
 
 def _summed(term: sp.Expr, inside: tuple[sp.Symbol, ...], writer: ExpressionWriter) -> str:
-    """Return a sum over j with its sign; factors without symbols `inside` stand before the sum sign."""
+    """Write a sum over j with its sign; factors without the symbols `inside` precede the sum sign."""
     term = sp.factor_terms(term) if term.is_Add else term
     negative = term.as_coeff_Mul()[0].is_negative
     outer, inner = (-term if negative else term).as_independent(*inside, as_Add=False)
@@ -310,9 +309,9 @@ def _summed(term: sp.Expr, inside: tuple[sp.Symbol, ...], writer: ExpressionWrit
 
 
 def _pairs(equations: Equations, i: int = 0) -> dict[int, int]:
-    """Map each coordinate of node i to its velocity.
+    """Map each coordinate of node i to its velocity, by component numbers.
 
-    The rate of a coordinate is another state alone, to which links add nothing.
+    A state is a coordinate if its rate is exactly another state, and links add nothing to the rate.
     """
     node, kind = equations.node_at(i), equations.kind_of[i]
     edges = [edge for (target, _), edge in equations.edge_of if target == kind]
@@ -322,18 +321,18 @@ def _pairs(equations: Equations, i: int = 0) -> dict[int, int]:
             velocity = node.state.index(rate)
             if velocity not in velocity_of.values():
                 velocity_of[c] = velocity
-    # a chain x' = v, v' = a is written to first order
+    # Write chains of more than two, x' = v, v' = a, as first-order equations.
     return {} if set(velocity_of) & set(velocity_of.values()) else velocity_of
 
 
 def _shown(equations: Equations, i: int = 0) -> list[int]:
-    """Return the components with an equation: all but coordinates, whose rate is a velocity."""
+    """Return the components that need an equation: all except coordinates."""
     pairs = _pairs(equations, i)
     return [c for c in range(len(equations.node_at(i).state)) if c not in pairs]
 
 
 def _ordered(e: sp.Expr, node: Node) -> list[sp.Expr]:
-    """Return the terms of an equation: springs, damping, constants, functions of time, friction last."""
+    """Sort the terms of an equation: springs, damping, constants, functions of time, friction."""
 
     def order(term: sp.Expr) -> tuple[bool, bool, int, int, tuple[object, ...]]:
         last = max((c for c, s in enumerate(node.state) if term.has(s)), default=len(node.state))

@@ -1,4 +1,4 @@
-"""The LaTeX that this package writes, as MathML, which browsers show without help from a network."""
+"""Convert the LaTeX that this package writes to MathML, which browsers display without a network connection."""
 
 # Why no library: reports and notebooks need this at run time, and latex2mathml 3.81, a dependency of the
 # documentation only, writes \mathrm{end} as three separate letters, sets \chi'' as a power of a power, keeps no
@@ -37,13 +37,13 @@ SIGNS = {
     "\\}": "}",
     "-": "−",
 }
-"""Operators that MathML writes with another character."""
+"""Operator in LaTeX -> character in MathML."""
 
 SPACES = ("\\left", "\\right", "\\:", "\\,", "\\;", "\\ ", "\\quad", "&")
-"""Tokens that MathML needs no element for, since it spaces operators itself."""
+"""Tokens without an element in MathML, which spaces operators itself."""
 
 NO_BREAK = "\u00a0"
-"""A space that browsers keep at the ends of a text too."""
+"""A space that browsers keep even at the ends of a text."""
 
 GAP = '<mspace width="0.14em"/>'
 """The space around a name of several letters in a product; its width is a choice."""
@@ -55,7 +55,7 @@ LETTERS = {
 
 
 def formula(latex: str, display: bool = False) -> str:
-    """Return a formula in this package's LaTeX as a MathML element that keeps the LaTeX beside it."""
+    """Convert a formula of this package's LaTeX to a MathML element with the LaTeX as annotation."""
     style = ' display="block"' if display else ""
     source = f'<annotation encoding="application/x-tex">{escape(latex)}</annotation>'
     return f"<math{style}><semantics>{_TokenReader(TOKENS.findall(latex)).row()}{source}</semantics></math>"
@@ -68,7 +68,7 @@ def mathml(equations: Equations) -> str:
 
 @dataclass(slots=True)
 class _TokenReader:
-    """Reads tokens of LaTeX from left to right; each method returns an element and moves `at` behind its tokens."""
+    """Parser of LaTeX tokens; each method reads tokens from `at`, advances `at` and returns an element."""
 
     tokens: list[str]
     at: int = 0
@@ -87,7 +87,7 @@ class _TokenReader:
         }
 
     def row(self, end: str = "") -> str:
-        """Read up to a token, or to the end."""
+        """Read a row of elements up to the token `end`, or up to the last token."""
         elements = []
         while self.at < len(self.tokens) and self.tokens[self.at] != end:
             elements.append(self.scripted())
@@ -95,7 +95,7 @@ class _TokenReader:
         return f"<mrow>{''.join(elements)}</mrow>"
 
     def scripted(self) -> str:
-        """Read an atom with its index, primes and exponent; a word gets a gap on both sides."""
+        """Read an atom with index, primes and exponent; add gaps on both sides of a word."""
         gap = GAP if self.tokens[self.at] == "\\mathrm" else ""
         element, below, above, primes = self.atom(), "", "", ""
         while self.at < len(self.tokens) and self.tokens[self.at] in ("_", "^", "'"):
@@ -107,7 +107,7 @@ class _TokenReader:
                 above += self.atom()
             else:
                 primes += "′"
-        if primes:  # primes stand behind the index: (χ₁)″
+        if primes:  # primes follow the index: (χ₁)″
             element = f"<msub>{element}{below}</msub>" if below else element
             element, below = f'<mrow>{element}<mo lspace="0" rspace="0">{primes}</mo></mrow>', ""
         if below and above:
@@ -131,7 +131,7 @@ class _TokenReader:
         if token.startswith("\\") and token not in SIGNS:
             raise ValueError(f"formula: found {token}; expected LaTeX as this package writes it")
 
-        # an operator: signs stand close to the term that follows, fences keep their size
+        # An operator: a sign at the start of a term has no space, and parentheses do not stretch.
         before = next((t for t in reversed(self.tokens[: self.at - 1]) if not t.isspace()), "=")
         form = ""
         if token in "+-" and before in ("=", "(", "{", "|", ",", "&"):
@@ -173,5 +173,5 @@ class _TokenReader:
 
 
 def _function(name: str) -> str:
-    """Return the name of a function, a little apart from the factor before it."""
+    """Write the name of a function after a gap."""
     return f'<mrow>{GAP}<mi mathvariant="normal">{name}</mi></mrow>'

@@ -1,7 +1,7 @@
-"""Expressions in the order of textbooks: one writer, two styles, LaTeX and plain Unicode text.
+"""Write expressions in the order of textbooks, as LaTeX or as plain Unicode text.
 
-SymPy's own printers order sums and products alphabetically; here x_2 - x_1 stays in that order,
-numbers come before parameters, parameters before variables, and functions last.
+SymPy's printers sort sums and products alphabetically.  Here sums keep their order, as in x_2 - x_1;
+in products numbers precede parameters, parameters precede variables, and functions are last.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import sympy as sp
 from sympy.printing.pretty.pretty_symbology import greek_unicode
 
 VARIANTS = {"theta": ("\\vartheta", "ϑ"), "epsilon": ("\\varepsilon", "ε")}
-"""Greek letters of which the field writes the other form: (LaTeX, Unicode)."""
+"""Greek letters written in their variant form: (LaTeX, Unicode)."""
 
 NAMES = {"atan": "arctan", "asin": "arcsin", "acos": "arccos", "sign": "sgn"}
-"""Functions with other names in LaTeX than in SymPy."""
+"""Name of a function in SymPy -> name in LaTeX, if they differ."""
 
 LATEX_FUNCTIONS = {
     "arccos",
@@ -38,9 +38,9 @@ LATEX_FUNCTIONS = {
 
 
 class Latex:
-    """LaTeX without \\left and \\right."""
+    """The style LaTeX, without \\left and \\right."""
 
-    bars = True  # fractions have a bar, so that sums need no parentheses there
+    bars = True  # fractions have a bar: sums in them need no parentheses
     sum_over_j = "\\sum_j "
     dots = "\\dots"
 
@@ -56,7 +56,7 @@ class Latex:
         return head + (f"_{below}" if len(below) == 1 else f"_{{{below}}}" if below else "") + "'" * primes
 
     def _word(self, name: str) -> str:
-        """Return the symbol of a Greek letter, a letter or number unchanged, and a word upright."""
+        """Write a Greek letter as its symbol, a letter or number unchanged, a word upright."""
         if name in VARIANTS:
             return VARIANTS[name][0]
         if name in greek_unicode:
@@ -77,7 +77,7 @@ class Latex:
         return rf"\frac{{{top}}}{{{bottom}}}"
 
     def beside(self, fraction: str) -> str:
-        """Write a fraction as a factor in front of others."""
+        """Write a fraction that other factors follow."""
         return fraction
 
     def power(self, base: str, exponent: str) -> str:
@@ -93,12 +93,12 @@ class Latex:
         return f"\\{name}" if name in LATEX_FUNCTIONS else rf"\operatorname{{{name}}}"
 
     def other(self, e: sp.Expr) -> str:
-        """Write anything without a rule here, by the printer of SymPy."""
+        """Write an expression that has no rule here with SymPy's printer."""
         return str(sp.latex(e))
 
 
 class Text:
-    """Plain text with Greek letters and superscripts."""
+    """The style plain text, with Greek letters and superscripts."""
 
     bars = False
     sum_over_j = "Σ_j"
@@ -137,7 +137,7 @@ class Text:
 
 
 Style: TypeAlias = Latex | Text
-"""The way in which the pieces of a formula are put together."""
+"""A style: methods that join the parts of a formula to text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,11 +145,11 @@ class ExpressionWriter:
     """Writes expressions in one style."""
 
     style: Style  # LaTeX or text
-    letters: Mapping[sp.Symbol, str]  # the written forms of symbols; others have their names
-    variables: frozenset[sp.Symbol]  # the symbols that follow the parameters in products
+    letters: Mapping[sp.Symbol, str]  # symbol -> written form; other symbols are written by name
+    variables: frozenset[sp.Symbol]  # symbols written after the parameters in products
 
     def total(self, terms: Iterable[sp.Expr]) -> str:
-        """Return a sum in the order given, 0 if it is empty."""
+        """Write a sum of terms in their order; 0 for an empty sum."""
         text = ""
         for term in map(_turned, terms):
             negative = _negative(term)
@@ -158,7 +158,7 @@ class ExpressionWriter:
         return text or "0"
 
     def write(self, e: sp.Expr) -> str:
-        """Return an expression as text."""
+        """Write an expression as text."""
         if isinstance(e, sp.Symbol):
             return self.letters.get(e, self.style.letter(e.name))
         if e.is_Add:
@@ -172,7 +172,7 @@ class ExpressionWriter:
         return self._called(e)
 
     def _called(self, e: sp.Expr) -> str:
-        """Write a function, pi, or anything else by the printer of SymPy."""
+        """Write a function or pi; write any other expression with SymPy's printer."""
         if e is sp.pi:
             return self.style.letter("pi")
         if isinstance(e, sp.Abs):
@@ -183,7 +183,7 @@ class ExpressionWriter:
         return self.style.other(e.xreplace({s: sp.Symbol(text) for s, text in self.letters.items()}))
 
     def factors(self, e: sp.Expr) -> list[str]:
-        """Return the factors of a product in order, sums in parentheses."""
+        """Write the factors of a product in order, sums in parentheses."""
         return [self._factor(f) for f in sorted(sp.Mul.make_args(e), key=self._rank)]
 
     def _product(self, e: sp.Expr) -> str:
@@ -197,7 +197,7 @@ class ExpressionWriter:
         return self.style.product([self.style.beside(front), *self.factors(variable)])
 
     def _part(self, e: sp.Expr) -> str:
-        """Write the top or bottom of a fraction."""
+        """Write the numerator or denominator of a fraction."""
         if e.is_Mul:
             return self.style.product(self.factors(e))
         return self.write(e) if self.style.bars else self._factor(e)
@@ -230,14 +230,14 @@ def _negative(e: sp.Expr) -> bool:
 
 
 def _turned(e: sp.Expr) -> sp.Expr:
-    """Take the sign out of sums with negative terms only: -(1 + a) d, not (-1 - a) d."""
+    """Factor -1 out of sums with negative terms only: -(1 + a) d, not (-1 - a) d."""
     if not e.is_Mul:
         return e
     return sp.Mul(*(sp.Mul(-1, -f, evaluate=False) if f.is_Add and all(map(_negative, f.args)) else f for f in e.args))
 
 
 def _fraction(e: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Return numerator and denominator; unlike in SymPy, exp(-x) stays above."""
+    """Return numerator and denominator; unlike in SymPy, exp(-x) stays in the numerator."""
     top, bottom = [], []
     for factor in sp.Mul.make_args(e):
         if factor.is_Rational:
