@@ -1,1 +1,1 @@
-"""Who runs rows: the integrator of a scene, its kernel, and the job that runs blocks of cells."""
+"""Run rows of cells: choose the integrator of a scene, load its kernel, and make the job that runs blocks of cells."""

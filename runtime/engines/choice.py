@@ -1,4 +1,4 @@
-"""Choose the integrator of each cell: the first by the rates at its start, later ones by the lengths of its steps."""
+"""Choose the integrator of each cell: at the start by the rates of the motion, later by the lengths of the steps."""
 
 from __future__ import annotations
 
@@ -36,27 +36,30 @@ from ..support.status import Status
 from .step_control import first_step, scale_of_atol, tolerances
 
 STIFF = 30.0
-"""Ratio of decay to turning and to change of a motion from which on Rosenbrock steps are faster, as measured
-(docs/performance.md)."""
+"""Rosenbrock steps are faster if decay is STIFF times as fast as the turning and the change of a motion; measured in
+docs/performance.md."""
 
 LAYER = 0.1
-"""Factor of the stiffness inside the layer of a smoothed jump: a choice, as motion is inside for a part of the time."""
+"""Weight of the stiffness inside the layer of a smoothed jump: a choice; motion is in the layer for part of the
+time."""
 
 FIRST_LOOK = 64.0
 """Steps after which a cell first pauses if many more are to come: a choice."""
 
 STALLED = 0.01
-"""Part of the shortest time of a motion below which steps are limited by the series, by a hidden pole, say: a choice."""
+"""Steps below this part of the shortest time of a motion are limited by the series, for example by a hidden pole: a
+choice."""
 
 SLIDE = 64.0
-"""A slide along a jump ends after 1/SLIDE of max_steps if its remaining time would take SLIDE times max_steps: a choice."""
+"""A slide along a jump is ended after 1/SLIDE of max_steps if its remaining time needs SLIDE times max_steps: a
+choice."""
 
 AUTOMATIC = ("taylor", "dop853", AUTO)
 """The integrators of `auto`, in the order in which cells try them."""
 
 
 def method_names(scene: Scene) -> tuple[str, ...]:
-    """Return the names of the integrators that cells of a scene may go through."""
+    """Return the names of the integrators that cells of a scene may use."""
     return AUTOMATIC if scene.integrator == "auto" else (scene.integrator,)
 
 
@@ -64,19 +67,20 @@ def method_names(scene: Scene) -> tuple[str, ...]:
 class Ladder:
     """The integrators of some equations in the order in which cells try them.
 
-    Series come first where they exist, then explicit stages, then a Rosenbrock method. A cell begins with the last one
-    if it is stiff at its start, else with the first one. While it runs it pauses at 64, 256, 1024 ... steps if many
-    are to come, and may change there: to Rosenbrock steps if its steps are as short as its fastest decay while its
-    motion is slow, to explicit stages if its series are far shorter than any time of its motion. A series without a next
-    term ends in steps that underflow, and changes as well. Each decision depends on the cell alone.
+    The order is: Taylor series where they exist, explicit stages, a Rosenbrock method. A cell that is stiff at its
+    start begins with the Rosenbrock method, any other cell with the first method. If many steps remain, a cell pauses
+    after 64, 256, 1024 … steps and may change its method. It changes to Rosenbrock steps if its steps are as short as
+    the time of its fastest decay although its motion is slow. It changes to explicit stages if its series steps are far
+    shorter than any time of its motion, or if they underflow because a series has no next term. Each decision depends
+    on the cell alone.
     """
 
     scene: Scene  # its integrator and its tolerances
-    equations: Equations  # those that are integrated
+    equations: Equations  # the equations that are integrated
 
     @cached_property
     def methods(self) -> tuple[Integrator, ...]:
-        """The integrators; one if the scene names it."""
+        """The integrators; a single one if the scene names its integrator."""
         if self.scene.integrator == "taylor":
             return (_taylor(self.scene, self.equations, is_large(self.equations)),)
         if self.scene.integrator != "auto":
@@ -100,12 +104,12 @@ class Ladder:
         return Templates(self.equations)
 
     def first(self, rows: CellRows) -> np.ndarray:
-        """Return which of the methods (cells,) each cell begins with."""
+        """Return the index (cells,) of the method with which each cell begins."""
         if len(self.methods) == 1:
             return np.zeros(len(rows), int)
         if self.scene.cells > 1:
             return self._first(rows)
-        # The run of a single cell chooses twice for the same row: for the kernel to load, and for the cell.
+        # A run of a single cell calls this twice with the same row: to choose the kernel, and to start the cell.
         key = b"".join(array.tobytes() for array in (rows.start, rows.numbers, rows.spans))
         if key not in self._chosen:
             self._chosen[key] = self._first(rows)
@@ -126,11 +130,14 @@ class Ladder:
         return np.where(stiff & (not self.equations.sticks), last, np.where(endless, self._explicit, 0))
 
     def main(self, rows: CellRows) -> Integrator:
-        """Return the method that most of some cells begin with."""
+        """Return the method with which most of these cells begin."""
         return self.methods[np.bincount(self.first(rows)).argmax()]
 
     def steps(self, rows: CellRows, first: np.ndarray) -> np.ndarray:
-        """Return spans (cells, len(SpanColumn)) with the first step and the first pause of cells that begin with some methods."""
+        """Return spans (cells, len(SpanColumn)) with the first step and the first pause.
+
+        `first`: index of the method.
+        """
         spans = rows.spans.copy()
         implicit = np.flatnonzero(np.array([method.implicit for method in self.methods])[first])
         if len(implicit):
@@ -139,7 +146,7 @@ class Ladder:
         return spans
 
     def further(self, rows: CellRows, buffers: Buffers, method: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-        """Return the next method (cells,) of cells that paused or whose steps underflow, -1 for none.
+        """Return the next method (cells,) of cells that paused or have steps that underflow; -1 to end the cell.
 
         Shapes: method (cells,), lengths (cells,), the mean steps since the last pause.
         """
@@ -166,10 +173,11 @@ class Ladder:
         return next(iter(unpassed(self.equations)), None) is not None
 
     def sliding(self, rows: CellRows, buffers: Buffers, lengths: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """Return whether paused cells (cells,) slide along a jump for longer than max_steps reach.
+        """Return whether paused cells (cells,) slide along a jump that max_steps cannot finish.
 
-        The error across a jump makes explicit steps short and alike: `lengths` (cells,) is their mean length since the last
-        pause, `before` that before it.  A slide may end soon, and so has 1/SLIDE of max_steps.
+        The error across a jump makes explicit steps short and of similar length. `lengths` (cells,) is the mean length
+        since the last pause, `before` (cells,) the mean length before that pause. A slide may end soon, and so may take
+        1/SLIDE of max_steps.
         """
         left = rows.spans[:, SpanColumn.END] - buffers.sums[:, SumColumn.STOPPED_AT]
         steady = (lengths < 2.0 * before) & (before < 2.0 * lengths)
@@ -179,8 +187,8 @@ class Ladder:
     def tolerances(self, rows: CellRows) -> tuple[np.ndarray, np.ndarray]:
         """Return (rtol, atol), each (cells,), of the integration.
 
-        A default atol shrinks for small motions (`scale_of_atol`). Their size is that of the start, or the distance that the
-        rates there cover in the shortest time of the cell.
+        A default atol shrinks for small motions (`scale_of_atol`). The size of a motion is the larger of the size of
+        its start, and the distance that the initial rates cover in the shortest time of the cell.
         """
         rtol, atol = tolerances(self.scene, self.equations, rows.numbers)
         if self.scene.given["atol"] is None:
@@ -192,23 +200,23 @@ class Ladder:
         return rtol, atol
 
     def at(self, rows: CellRows, state: np.ndarray, time: np.ndarray) -> Paces:
-        """Return the rates of cells at some states and times, with states exact to the tolerances."""
+        """Return the rates of cells at states and times; the states have errors of the size of the tolerances."""
         rtol, atol = self.tolerances(rows)
         noise = rtol[:, None] * np.minimum(np.abs(state), self.longest) + atol[:, None]
         return self.templates.paces(state, rows.numbers, time, rows.spans[:, SpanColumn.LONGEST], noise)
 
     @cached_property
     def longest(self) -> np.ndarray:
-        """Largest sizes of the states (dimension,) for tolerances: the period of an angle, infinity for any other state."""
+        """Size limits (dimension,) of states for tolerances: the period of an angle, infinity for any other state."""
         return np.array([period or np.inf for period in periods_of_states(self.equations)])
 
     @property
     def _explicit(self) -> int:
-        """Index of the explicit method with stages."""
+        """Index of the explicit method among the methods."""
         return next(k for k, m in enumerate(self.methods) if not m.series)
 
     def _enters_layers(self, rows: CellRows, slow: np.ndarray) -> np.ndarray:
-        """Return whether a smoothed jump is stiff inside, for cells (cells,) that start outside."""
+        """Return whether cells (cells,) that start outside the layers of smoothed jumps are stiff inside a layer."""
         enters = np.zeros(len(rows), dtype=bool)
         for blocks in self.templates.layers(rows.start, rows.numbers):
             fastest, turning, *_ = eigenvalue_rates(blocks)
@@ -233,14 +241,14 @@ def first_steps(templates: Templates, rows: CellRows) -> np.ndarray:
 def _has_series(equations: Equations) -> bool:
     """Return whether Taylor steps can pass all kinks and jumps of the equations, and compile fast enough.
 
-    No motion may slide along a jump, or pass another point without a series.  The recurrences of a dense mass matrix take
-    longer to compile than most runs take.
+    No motion may slide along a jump, or pass a point without a series. Dense mass matrices are excluded too: their
+    recurrences take longer to compile than most runs.
     """
     return not equations.inertial and taylor_obstacle(equations) is None and not may_cross_singularity(equations)
 
 
 def chosen_for_rows(scene: Scene, equations: Equations, rows: CellRows) -> Integrator:
-    """Return the one integrator for equations whose cells come as rows: the last one that any cell begins with."""
+    """Return one integrator for all rows: of the methods with which rows begin, the last in the order of the ladder."""
     ladder = Ladder(scene, equations)
     return ladder.methods[int(ladder.first(rows).max())]
 
@@ -255,7 +263,8 @@ def chosen_for_modes(
 ) -> Integrator:
     """Return the integrator of orbits with deviations along them: a Taylor or a Rosenbrock method.
 
-    Taylor steps if all functions are analytic, and neither the orbit nor the strongest mode is stiff at the start.
+    Choose Taylor steps if all functions are analytic, and neither the orbit nor the strongest mode is stiff at the
+    start.
     Shapes: state (cells, dimension), parameters (cells, count), strengths (number of strengths, modes).
     """
     if scene.integrator == "taylor":
@@ -273,9 +282,10 @@ def _taylor(scene: Scene, equations: Equations, large: bool = False) -> Integrat
 def mode_stiffness(
     variation: Variation, state: np.ndarray, parameters: np.ndarray, strengths: np.ndarray, slow: float = 1.0
 ) -> float:
-    """Return the largest ratio, of the first orbits, of decay or growth of deviations to their turning or to `slow`.
+    """Return the stiffness of modes: the ratio of decay or growth of deviations to their turning, or to `slow`.
 
-    Parameters as for `chosen_for_modes`; strength zero and the extreme ones are compared.
+    The largest ratio along the first orbits counts, for strength zero and the extreme strengths. Parameters as for
+    `chosen_for_modes`.
     """
     rates = mode_rates(variation, state, parameters, strengths)
     return max((at.fastest / max(slow, at.turning) for at in rates), default=0.0)
@@ -289,9 +299,9 @@ def warn_of_stiff_modes(
     step: float,
     slow: float = 1.0,
 ) -> bool:
-    """Warn if Taylor steps with deviations were short, `step` in the mean, because the modes are stiff; return whether they were.
+    """Warn if Taylor steps with deviations were short because modes are stiff; return True after a warning.
 
-    The other parameters are those of `chosen_for_modes`.
+    `step`: mean length of the steps. Other parameters as for `chosen_for_modes`.
     """
     if step * STIFF * slow >= 1.0:
         return False

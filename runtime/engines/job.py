@@ -1,7 +1,7 @@
-"""Jobs: a compiled kernel with all data to run cells, and the specification that rebuilds it in another process.
+"""Define jobs: a compiled kernel with all data to run cells, and a specification that rebuilds the job elsewhere.
 
-A job runs in threads of this process.  A worker that does not share its memory, in another process or on another machine,
-receives the specification once, packed, and compiles the kernel from its installation (`sweeps/worker.py`).
+A job runs in threads of this process. A worker in another process or on another machine receives the packed
+specification once, and compiles the kernel from its own installation (`sweeps/worker.py`).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from .ladder_engine import LadderEngine, run_rows
 from .scene_kernels import write_kernel
 
 Start = tuple[np.ndarray, np.ndarray]
-"""States (cells, dimension) to start from in place of the scene's, and whether they are valid (cells,)."""
+"""States (cells, dimension) that replace the start of the scene, and whether each is valid (cells,)."""
 
 
 class Job(Protocol):
@@ -116,7 +116,7 @@ class JobSpec:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SweepSpec:
-    """The sweep of a reduced scene; `room` are section points to make room for at first."""
+    """The sweep of a reduced scene; `room`: initial number of section points that a buffer can hold."""
 
     reduction: ReducedScene
     room: int | None = None
@@ -132,10 +132,10 @@ class SweepSpec:
 
 @dataclass(slots=True)
 class SweepJob:
-    """Lay out cells of a sweep as rows, which an engine integrates."""
+    """Lay out cells of a sweep as rows, and integrate them with an engine."""
 
     spec: JobSpec
-    kernel: Kernel  # with which most cells begin; the attributes of results name it
+    kernel: Kernel  # the kernel with which most cells begin; named in the attributes of results
     reduction: ReducedScene
     engine: Engine
 
@@ -153,12 +153,12 @@ class SweepJob:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RowsSpec:
-    """Equations without a sweep, whose cells come as rows; the synchronisation error is the only record."""
+    """Equations whose cells come as rows, without a sweep."""
 
     equations: Equations
     integrator: Integrator | str
     control: np.ndarray  # (len(Control),)
-    # the record is the synchronisation error, or none if all oscillators are stepped as one; a scene may have a stop
+    # the synchronisation error is recorded, unless all oscillators are stepped as one; a scene may have a stop
     recording: Recording = SYNC_ERROR
 
     def source(self, width: int | None = None) -> SweepKernel:
@@ -172,7 +172,7 @@ class RowsSpec:
 
 @dataclass(slots=True)
 class RowsJob:
-    """A kernel, ready to run any rows: a job, and an `Engine` of one integrator."""
+    """Run any rows with one kernel; both a `Job` and an `Engine` of one integrator."""
 
     spec: JobSpec
     kernel: Kernel
@@ -195,6 +195,6 @@ class RowsJob:
 
 @cache
 def versions() -> str:
-    """Return the versions that a result depends on."""
+    """Return the versions of software on which a result depends."""
     names = ("synchain", "numba", "numpy", "sympy")
     return ", ".join(f"{name} {importlib.metadata.version(name)}" for name in names)

@@ -1,4 +1,4 @@
-"""The engine of scenes: compiled kernels of several integrators, among which each cell climbs as its steps require."""
+"""Integrate the cells of scenes with compiled kernels of several integrators; a cell may change its integrator."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from .scene_kernels import ladder_of, write_kernel
 from .step_control import control_of
 
 LARGEST_ROOM = 2**25
-"""Numbers of the first room for section points of a block, 268 MB: a choice."""
+"""Largest initial buffer for the section points of a block, in numbers (268 MB): a choice."""
 
 
 @dataclass(slots=True)
 class LadderEngine:
     """Integrate rows of a scene; an `Engine`.
 
-    `kernel` belongs to the integrator with which most cells begin; kernels of others are loaded when the first cell needs
-    them.  `room` are the section points of a cell to make room for at first; by default two a period, as far as memory
-    allows.
+    `kernel` belongs to the integrator with which most cells begin. The kernel of another integrator is loaded when the
+    first cell needs it. `room` is the number of section points of a cell that the buffers hold at first; by default two
+    per period, as far as memory allows.
     """
 
     reduction: ReducedScene
@@ -58,7 +58,7 @@ class LadderEngine:
                 control[Control.CANCEL] = 1.0
 
     def run(self, rows: CellRows) -> Buffers:
-        """Integrate rows; cells with more section points than there is room for run again with the room that they need."""
+        """Integrate rows; if cells have too many section points for the buffers, run them again with larger buffers."""
         reduction, room = self.reduction, self.room
         if room is None:
             room = first_room(reduction.scene, len(rows) * (reduction.point_size + 1))
@@ -70,7 +70,7 @@ class LadderEngine:
         return buffers
 
     def _climb(self, rows: CellRows, room: int) -> Buffers:
-        """Integrate rows with room for some section points of each, each row by the integrators that suit it."""
+        """Integrate each row by its integrators, with buffers for `room` section points per row."""
         reduction, ladder = self.reduction, self.ladder
         buffers = reduction.empty(len(rows), room, reduction.observed.tallies)
         buffers.tolerances[:] = np.stack(ladder.tolerances(rows), axis=1)
@@ -98,13 +98,13 @@ class LadderEngine:
             time, steps = buffers.sums[cells, SumColumn.STOPPED_AT], buffers.steps[cells]
             lengths = (time - paused_time[cells]) / np.maximum(steps - paused_steps[cells], 1.0)
             paused_time[cells], paused_steps[cells] = time, steps
-            # Choose the next integrator of each cell; -1 ends it, as does a slide that would take too many steps.
+            # Choose the next integrator of each cell; -1, or a slide that takes too many steps, ends the cell.
             cell_rows, state = rows.take(cells), buffers.take(cells)
             following = ladder.further(cell_rows, state, method[cells], lengths)
             sliding = (following == method[cells]) & ladder.sliding(cell_rows, state, lengths, paused_length[cells])
             buffers.counts[cells[sliding], Count.STATUS] = Status.STEP_BUDGET
             following[sliding], paused_length[cells] = -1, lengths
-            # Continue from the lanes, with new step sizes where the integrator changes.
+            # Continue from the saved lanes; where the integrator changes, set new step sizes.
             cells, lengths, following = (column[following >= 0] for column in (cells, lengths, following))
             buffers.counts[cells, Count.STATUS] = Status.PAUSED
             changed = following != method[cells]
@@ -128,7 +128,7 @@ class LadderEngine:
                 buffers.put(group, part)
 
     def _control(self, rtol: float, atol: float) -> np.ndarray:
-        """Return the control array of some tolerances, which `cancel` reaches."""
+        """Return the control array for these tolerances; `cancel` sets its flag."""
         with self.lock:
             if (rtol, atol) not in self.controls:
                 control = self.controls[rtol, atol] = self.control.copy()
@@ -136,7 +136,7 @@ class LadderEngine:
             return self.controls[rtol, atol]
 
     def _kernel(self, method: Integrator) -> Kernel:
-        """Return the kernel of a method; lanes do not change results, so that only a single cell fixes their number."""
+        """Return the kernel of a method; the number of lanes does not change results, and is 1 for a single cell."""
         with self.lock:
             if method.name not in self.kernels:
                 width = 1 if self.kernel.origin.width == 1 else None
@@ -150,22 +150,22 @@ def run_rows(kernel: Kernel, rows: CellRows, control: np.ndarray, buffers: Buffe
 
 
 def lane_size(equations: Equations) -> int:
-    """Return the size of a cell's lane: clock, state, parameters, and a saved state with what repeats."""
+    """Return the size of a cell's lane: clock, state, parameters, and the state saved for the search for repetition."""
     return slot.CLOCK + 2 * equations.dimension + len(equations.parameters) + len(REPEATING)
 
 
 def hand_over(lanes: np.ndarray, cells: np.ndarray, length: np.ndarray, ladder: Ladder, method: np.ndarray) -> None:
-    """Prepare lanes to go on by another method from the state that they have reached.
+    """Prepare lanes to continue with another method from their present state.
 
-    The new method begins with the mean length of the last steps, and stops at the ends of all periods unless it is a
-    series.  The search for repetition starts anew.
+    The new method begins with the mean length of the last steps. It stops at the end of every period, unless it is a
+    series. The search for repetition starts again.
     """
     lane = lanes[cells]
     time, until = lane[:, slot.TIME], lane[:, slot.UNTIL]
     # Step control: first step, memory of the controller, error of the last change.
     first = np.where(length > 0.0, length, FIRST_STEP * np.minimum(1.0, until))
     lane[:, slot.STEP], lane[:, slot.MEMORY], lane[:, slot.CHANGE] = first, 0.0, np.inf
-    # Repetition.
+    # Restart the search for repetition.
     lane[:, slot.CYCLE], lane[:, slot.POWER], lane[:, slot.DUE], lane[:, slot.BOUND] = (
         0.0,
         1.0,
@@ -183,7 +183,10 @@ def hand_over(lanes: np.ndarray, cells: np.ndarray, length: np.ndarray, ladder: 
 
 
 def first_room(scene: Scene, row: int) -> int:
-    """Return the section points to make room for at first: two a period, if one more takes `row` numbers of a block."""
+    """Return the initial number of section points per cell: two per period, if memory allows.
+
+    `row`: numbers in a block for one more section point of every cell.
+    """
     if "section" not in scene.record and not scene.sections:
         return 0
     periods = scene.window if scene.time_unit == "period" else scene.window / math.pi

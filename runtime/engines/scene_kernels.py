@@ -1,4 +1,4 @@
-"""The kernel of a scene: its text, or the text compiled."""
+"""Write and compile the kernel of a scene."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .choice import Ladder
 
 
 def kernel(scene: Scene, width: int | None = None, reduce: bool | ReducedScene = True) -> Kernel:
-    """Return the compiled kernel of a scene, the one that `run(scene)` runs.
+    """Return the compiled kernel with which `run(scene)` integrates a scene.
 
     Scenes that differ only in numbers share a kernel.
 
@@ -69,11 +69,11 @@ def write_kernel(reduction: ReducedScene, width: int | None = None, method: Inte
 
 
 _emitted = lru_cache(maxsize=32)(emit)
-"""`emit`; runs that differ only in numbers share the text."""
+"""`emit` with a cache; scenes that differ only in numbers share the text."""
 
 
 def warn_of_chords(source: SweepKernel) -> None:
-    """Warn of records of states between steps by an integrator that joins its steps by straight lines."""
+    """Warn of recorded states between steps, if the integrator interpolates linearly between steps."""
     records = {"sample": "trajectory", "cut": "sections", "tally": "observables"}
     between = [records[r.entry] for r in reversed(source.recorders) if r.entry in records]
     if between and source.method.dense_order < 2:

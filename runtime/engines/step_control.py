@@ -1,4 +1,4 @@
-"""How steps are controlled: tolerances, first steps, and the array that hands them to a kernel."""
+"""Compute tolerances and first steps, and the array that passes them to a kernel."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from synchain.models.scenes.scene import Scene
 from ..cells.plan import FIRST_STEP, Planner
 
 GROWN = 0.1
-"""Longest first step of a Rosenbrock method, in times in which the fastest growth is by a factor e: a choice."""
+"""Longest first step of a Rosenbrock method, relative to the time of growth by a factor e: a choice."""
 
 DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
-"""The numbers of a kernel for the directions of a section."""
+"""Numbers by which a kernel distinguishes the directions of a section."""
 
 
 def control_array(
@@ -33,7 +33,7 @@ def control_array(
 
 
 def control_of(planner: Planner, jumps: bool) -> np.ndarray:
-    """Return the control array of a scene's sweep, with the tolerances of its strictest cell and a direction per section."""
+    """Return the control array of a scene's sweep: tolerances of the strictest cell, and a direction per section."""
     scene = planner.scene
     rtol, atol = (float(column.min()) for column in tolerances(scene, scene.equations, planner.extremes().numbers))
     directions = [DIRECTIONS[section.direction] for section in scene.sections.values() or (scene.section,)]
@@ -42,10 +42,11 @@ def control_of(planner: Planner, jumps: bool) -> np.ndarray:
 
 
 def first_step(growth: float) -> float:
-    """Return the length of the first step of a Rosenbrock method, by how fast motions grow where it begins.
+    """Return the first step of a Rosenbrock method, from the rate of growth of motions at the start.
 
-    A step much longer than the time of growth damps fast growth as it does fast decay, and the estimate of the error with
-    it: the motion would stay at an equilibrium that repels.  Steps that lengthen with the solution resolve the growth.
+    A step much longer than the time of growth damps fast growth like fast decay, and damps the error estimate too: the
+    motion would stay at an unstable equilibrium. A short first step, after which the steps lengthen, resolves the
+    growth.
     """
     return min(FIRST_STEP, GROWN / max(growth, GROWN))
 
@@ -53,9 +54,9 @@ def first_step(growth: float) -> float:
 def tolerances(scene: Scene, equations: Equations, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return (rtol, atol), each (cells,), of the integration; `parameters` (cells, count) are those of the equations.
 
-    A smoothed jump of friction is 1/kappa wide in velocity; with steps that do not resolve this width oscillators slip
-    through it.  With contact "atan" rtol is therefore at most 1/kappa and atol at most 0.1/kappa (not below 1e-13), for
-    the largest kappa of the nodes.
+    A smoothed jump of friction has the width 1/kappa in velocity; steps that do not resolve this width miss the jump.
+    With contact "atan", rtol is therefore at most 1/kappa and atol at most 0.1/kappa (not below 1e-13), for the largest
+    kappa of the nodes.
     """
     rtol, atol = np.full(len(parameters), scene.rtol), np.full(len(parameters), scene.atol)
     names = _names_of(scene, "kappa")
@@ -67,7 +68,7 @@ def tolerances(scene: Scene, equations: Equations, parameters: np.ndarray) -> tu
 
 
 def _names_of(scene: Scene, name: str) -> set[str]:
-    """Return the names of a parameter in a scene: one, a_1 … a_n if nodes differ, k_1_2 … if links do."""
+    """Return the names of a parameter in a scene: a single name, a_1 … a_n for each node, or k_1_2 … for each link."""
     if name not in scene.varied:
         return {name}
     links = scene.model.link_names(name)
@@ -75,10 +76,10 @@ def _names_of(scene: Scene, name: str) -> set[str]:
 
 
 def scale_of_atol(size: np.ndarray) -> np.ndarray:
-    """Return the factor of a default atol, a tenth of rtol, for motions of some sizes: a power of ten, at most 1.
+    """Return the factor of the default atol for motions of these sizes: a power of ten, at most 1.
 
-    Below size 0.1 atol is between a tenth of rtol times the size and all of it, in decades that end at 0.1, 0.01 and so on.
-    Motions above keep the atol of size 1: for a motion of size 1e9 it is next to nothing beside rtol times the size, so
-    that steps are as exact as rtol demands and only a little shorter.  A size of 0 is unknown.
+    The default atol is a tenth of rtol. For sizes below 0.1, the scaled atol is between 0.1 and 1 times rtol times the
+    size; it changes at 0.1, 0.01 and so on. Larger motions keep the default: for a motion of size 1e9, atol is
+    negligible beside rtol times the size, so that rtol alone controls the steps. A size of 0 means an unknown size.
     """
     return np.asarray(10.0 ** np.floor(np.log10(np.where((size > 0.0) & (size < 0.1), 10.0 * size, 1.0))))

@@ -1,4 +1,4 @@
-"""Warnings about steps: cells without an end, stiffness, unbounded motion, angles beyond their digits."""
+"""Warn about steps: unfinished cells, stiffness, unbounded motion, angles too large for their tolerance."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from ..support.status import Status
 from .choice import STIFF, Ladder
 
 FEW = 100
-"""Steps of a cell below which there is no warning of short steps: a choice."""
+"""There is no warning of short steps for a cell with fewer than FEW steps: a choice."""
 
 BLOWN = 1e6
-"""Growth of a state from which on a motion that still grows at its fastest rate counts as unbounded: a choice."""
+"""A motion counts as unbounded if it has grown by this factor and still grows at its fastest rate: a choice."""
 
 
 def warn_of_steps(ladder: Ladder, buffers: Buffers, rows_of: Callable[[np.ndarray], CellRows]) -> None:
-    """Warn of cells that reached no end or made no step, of stiffness, unbounded motion, and angles beyond their digits."""
+    """Warn of cells that did not finish or made no step, of stiffness, of unbounded motion, and of too large angles."""
     status, steps, times = buffers.status, buffers.steps, buffers.sums[:, SumColumn.STOPPED_AT]
     idle = np.isin(status, (Status.STEP_UNDERFLOW, Status.STEP_BUDGET)) & (times <= 0.0)
     if len(status) and not np.isin(status, (Status.FINISHED, Status.STOPPED, Status.INTERRUPTED, Status.NOT_RUN)).any():
@@ -35,7 +35,7 @@ def warn_of_steps(ladder: Ladder, buffers: Buffers, rows_of: Callable[[np.ndarra
     regular &= np.isfinite(buffers.end).all(axis=1)
     sizes = np.abs(buffers.end)
     _warn_of_far_angles(ladder, np.where(regular[:, None], sizes, 0.0))
-    # Rates at the ends of large states and, of explicit methods, of cells with many steps.
+    # Compute rates at the end of cells with large states, and of cells with many steps of an explicit method.
     sizes = np.minimum(sizes, ladder.longest)
     cells = np.flatnonzero(regular & ((sizes.max(axis=1) > BLOWN) | (explicit & (steps >= FEW))))
     if not len(cells):
@@ -62,7 +62,10 @@ def warn_of_steps(ladder: Ladder, buffers: Buffers, rows_of: Callable[[np.ndarra
 
 
 def _warn_of_far_angles(ladder: Ladder, sizes: np.ndarray) -> None:
-    """Warn if the rounding of an angle exceeds its tolerance; `sizes` (cells, dimension) are those at the ends."""
+    """Warn if the rounding error of an angle exceeds the tolerance.
+
+    `sizes` (cells, dimension): final sizes of states.
+    """
     allowed = np.where(np.isinf(ladder.longest), np.inf, ladder.scene.rtol * ladder.longest + ladder.scene.atol)
     shares = np.finfo(float).eps * sizes / allowed
     if shares.max(initial=0.0) <= 1.0:

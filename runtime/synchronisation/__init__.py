@@ -1,1 +1,1 @@
-"""Thresholds, the universal probe, basins and the agreement of prediction and simulation."""
+"""Compute thresholds, the universal probe and basins, and compare prediction with simulation."""

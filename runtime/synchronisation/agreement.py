@@ -1,7 +1,7 @@
-"""The stability of synchronous motion from exponents beside direct simulation, for each value of sigma.
+"""Compare the stability of synchronous motion from exponents with direct simulation, for each value of sigma.
 
-Exponents give yes where all of them are negative by more than two standard errors, no where one is positive
-by more than that.  Where a simulation disagrees, further simulations search for the cause.
+By exponents, a network synchronises if all of them are below zero by more than two standard errors, and does not
+synchronise if one is above zero by more than two. If a simulation disagrees, further simulations search for the cause.
 
 Sources: bubbling: Ashwin, Buescu & Stewart, Phys. Lett. A 193, 126 (1994); mergers by round-off:
 Pikovsky, Phys. Rev. Lett. 73, 2931 (1994).
@@ -35,13 +35,13 @@ CAUSES = ("transient too short", "round-off merger", "intermittency", "coexistin
 """Reasons for a disagreement, in the order in which `agreement` explains them."""
 
 LONGER = 4.0
-"""Ratio of the transient in the search for a cause to that of the criterion (a choice)."""
+"""Ratio of the transient in the search for a cause to the transient of the criterion (a choice)."""
 
 MERGED = 1e-14
-"""A mean synchronisation error below this part of the motion's extent is round-off, not a distance."""
+"""A mean synchronisation error below this part of the motion's extent counts as round-off."""
 
 NEAR_ZERO = 5.0
-"""Standard errors within which an exponent counts as 0: bursts occur on both sides (a choice)."""
+"""An exponent within this number of standard errors counts as 0; bursts occur on both sides of 0 (a choice)."""
 
 NUDGE = 1e-5
 """Distance between neighbours in a start next to the synchronous state, relative to the motion's extent (a choice)."""
@@ -52,17 +52,17 @@ class Cell:
     """One value of sigma, judged by exponents and by simulation."""
 
     sigma: float
-    exponent: float  # largest transversal one
-    stderr: float
+    exponent: float  # largest transversal exponent
+    stderr: float  # standard error of the exponent
     share: float  # part of the starts that synchronised
-    error: float  # median of their mean synchronisation errors
+    error: float  # median over the starts of the mean synchronisation error
     outcome: str  # one of OUTCOMES
-    cause: str = ""  # one of CAUSES where the two disagree
+    cause: str = ""  # one of CAUSES if exponents and simulation disagree
 
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """A scene's network judged twice for each sigma."""
+    """Verdicts on a scene's network by exponents and by simulation, for each sigma."""
 
     scene: Scene
     criterion: AppliedCriterion
@@ -76,12 +76,12 @@ class Agreement:
 
     @property
     def causes(self) -> dict[str, int]:
-        """Number of disagreements with each cause that occurs."""
+        """Number of disagreements by cause; causes that do not occur are left out."""
         counts = Counter(cell.cause for cell in self.cells if cell.cause)
         return {cause: counts[cause] for cause in CAUSES if counts[cause]}
 
     def as_dict(self) -> dict[str, object]:
-        """Return counts, causes, and for each sigma the numbers, outcome and cause, for JSON."""
+        """Return counts, causes, and the fields of each `Cell`, for JSON."""
         names = ("sigma", "exponent", "stderr", "share", "error", "outcome", "cause")
         rows = [{name: getattr(cell, name) for name in names} for cell in self.cells]
         return {"counts": self.counts, "causes": self.causes, "cells": rows}
@@ -90,8 +90,8 @@ class Agreement:
 def strengths(graph: Topology, sigma: Sequence[float] | np.ndarray) -> np.ndarray:
     """Return the strengths alpha = sigma |gamma_k| (sigma, modes) of a graph's distinct transversal modes.
 
-    A part of the network without links to the others has the strength 0.  Raise ValueError for a graph without links,
-    and for eigenvalues that are complex or positive.
+    If the network has several parts without links between them, one strength is 0. Raise ValueError for a graph without
+    links, and for eigenvalues that are complex or positive.
     """
     spectrum = graph.spectrum
     check_probe(graph, spectrum)
@@ -125,7 +125,7 @@ def agreement(
     simulation = DirectSimulation(scene, fitted(scene, grid, checked(criterion), execution), execution)
     alpha = strengths(scene.topology, grid)
     line = line or exponents(scene, np.unique(alpha), workers=workers, show_progress=show_progress, progress=progress)
-    # indices (sigma, modes) of all strengths on the line
+    # find the indices (sigma, modes) of all strengths on the line
     order = np.argsort(line.alpha)
     indices = order[np.clip(np.searchsorted(line.alpha[order], alpha), 0, len(order) - 1)]
     missing = alpha[line.alpha[indices] != alpha]
@@ -139,14 +139,14 @@ def agreement(
         cells.append(
             Cell(float(value), float(line.exponent[k]), float(line.stderr[k]), float(share), float(error), outcome)
         )
-        # motions of different starts with exponents of different signs
+        # the starts reach motions with exponents of different signs
         largest = line.by_start[:, modes].max(axis=1)
         split.append(bool(largest.min() < 0.0 < largest.max()))
     return Agreement(scene, simulation.criterion, tuple(_explained(simulation, cells, split)))
 
 
 def _outcome(exponent: np.ndarray, error: np.ndarray, simulated: bool) -> str:
-    """Compare the signs of all exponents with a simulation; a sign is certain beyond two errors."""
+    """Compare the signs of all exponents with a simulation; a sign is certain if the exponent exceeds two errors."""
     if np.all(exponent + 2.0 * error < 0.0):
         return OUTCOMES[0] if simulated else OUTCOMES[2]
     if np.any(exponent - 2.0 * error > 0.0):
@@ -163,7 +163,10 @@ class DirectSimulation:
     execution: Execution
 
     def simulate(self, sigma: np.ndarray, longer: float = 1.0, near: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Return the share of the starts that synchronised and the median error (sigma,); `near` starts next to synchrony."""
+        """Return the share of the starts that synchronised and the median error, each (sigma,).
+
+        `longer`: factor of the transient. `near`: begin near the synchronous state.
+        """
         scene = self.scene
         if near:
             first = {name: np.array(values[:1] * scene.n) for name, values in scene.initial.items()}
@@ -177,7 +180,10 @@ class DirectSimulation:
 
 
 def _explained(simulation: DirectSimulation, cells: Sequence[Cell], split: Sequence[bool]) -> list[Cell]:
-    """The cells with causes: disagreements are simulated again, longer, and from next to the synchronous state."""
+    """Return the cells with causes.
+
+    Simulate each disagreement again, for longer and from near the synchronous state.
+    """
     explained = list(cells)
     differing = [i for i, cell in enumerate(cells) if cell.outcome in OUTCOMES[2:4]]
     if not differing:
@@ -192,7 +198,11 @@ def _explained(simulation: DirectSimulation, cells: Sequence[Cell], split: Seque
 
 
 def _cause(cell: Cell, merged: bool, longer: float, near: float, split: bool) -> str:
-    """The cause of a disagreement, from the shares of starts that synchronise after a longer transient and from nearby."""
+    """Return the cause of a disagreement.
+
+    `longer`, `near`: shares of the starts that synchronise after a longer transient, and from near the synchronous
+    state.
+    """
     stable = cell.outcome == OUTCOMES[2]
     mixed = 0.0 < cell.share < 1.0 or 0.0 < longer < 1.0
     if not stable and merged:

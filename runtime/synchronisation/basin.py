@@ -1,6 +1,6 @@
-"""Basin stability: the share of random starts from which a network synchronises.
+"""Compute basin stability: the share of random starts from which a network synchronises.
 
-The starts are independent, so the share has the exact confidence interval of a binomial proportion.
+The starts are independent, so that the exact confidence interval of a binomial proportion applies.
 
 Sources: Menck, Heitzig, Marwan & Kurths, Nature Phys. 9, 89 (2013); Clopper & Pearson, Biometrika
 26, 404 (1934).
@@ -40,14 +40,14 @@ from .trials import Outcome, Trials
 Range = tuple[float, float]
 
 SAMPLE_LIMIT = 10_000_000
-"""Most starts of one call (a choice)."""
+"""Largest number of starts in one call (a choice)."""
 
 LONGEST = 5000.0
-"""Longest average of the exponent, in its units of time (a choice)."""
+"""Longest average of the exponent, in units of time of the exponent (a choice)."""
 
 
 class Fate(Word):
-    """End of a start: synchronous, on the way there when its time was over, on another motion, or without an end."""
+    """Fate of a start: synchronous, still approaching synchrony at the end, on another motion, or not finished."""
 
     SYNCHRONOUS = "synchronous"
     APPROACHING = "still approaching"
@@ -64,10 +64,10 @@ UNDECIDED = (Fate.APPROACHING, Fate.UNFINISHED)
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Basin(Labelled):
-    """Which random starts of a scene's network synchronise.
+    """The fates of random starts of a scene's network.
 
-    A start that is not synchronous is still approaching if its error falls, or if no error could have fallen below the
-    tolerance in this time.
+    A start that is not synchronous counts as still approaching if its error falls, or if the time is too short for any
+    error to fall below the tolerance.
     """
 
     scene: Scene
@@ -75,13 +75,11 @@ class Basin(Labelled):
     confidence: float
     start: np.ndarray = field(repr=False)  # (samples, dimension)
     error: np.ndarray = field(repr=False)  # (samples,): synchronisation error, infinite where a cell did not finish
-    status: np.ndarray = field(repr=False)  # (samples,): how the cell ended
-    earlier: np.ndarray = field(
-        repr=False
-    )  # (samples,): error after half of the transient, NaN where it was not needed
+    status: np.ndarray = field(repr=False)  # (samples,): status at the end of the cell
+    earlier: np.ndarray = field(repr=False)  # (samples,): error after half of the transient, NaN if not needed
     fate: np.ndarray = field(repr=False)  # (samples,): index of its `Fate`
-    exponent: float = math.nan  # largest transversal exponent of the synchronous state; NaN if not needed or not known
-    stderr: float = math.nan  # its standard error
+    exponent: float = math.nan  # largest transversal exponent of the synchronous state; NaN if not computed
+    stderr: float = math.nan  # standard error of `exponent`
 
     @property
     def data(self) -> xr.Dataset:
@@ -106,7 +104,7 @@ class Basin(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """Scene, shares with their interval, how cells ended, and the criterion."""
+        """Scene, shares with their interval, statuses of cells, and the criterion."""
         return (
             ("scene", scene_text(self.scene)),
             *(("starts", words) for words in self._findings()),
@@ -120,7 +118,7 @@ class Basin(Labelled):
 
     @property
     def tolerance(self) -> float:
-        """Error below which a start is synchronous."""
+        """A start is synchronous if its error is below this value."""
         return self.criterion.tolerance
 
     @property
@@ -146,9 +144,9 @@ class Basin(Labelled):
 
     @property
     def interval(self) -> Range:
-        """Confidence interval of the share among all possible starts, of the level `confidence` or a higher one.
+        """Confidence interval of the share among all possible starts; its level is at least `confidence`.
 
-        The lower end is that of the starts that synchronised, the upper end that with those that are undecided.
+        For the lower end, only the starts that synchronised count; for the upper end, the undecided starts count too.
         """
         from scipy.stats import binomtest
 
@@ -165,11 +163,11 @@ class Basin(Labelled):
 
     @property
     def message(self) -> str:
-        """Shares, interval, the exponent if it was needed, and the number of cells of each status, as text."""
+        """Text with shares, interval, the exponent if it was computed, and the number of cells with each status."""
         return "; ".join(self._findings())
 
     def _findings(self) -> list[str]:
-        """The parts of the message."""
+        """Return the parts of the message."""
         low, high = self.interval
         first = f"{self.count} of {self.samples} starts synchronised: {self.share:.4g}"
         others = (f"{name}: {share:.4g}" for name, share in self.shares.items() if share and name != Fate.SYNCHRONOUS)
@@ -201,21 +199,21 @@ def basin(
 ) -> Basin:
     """Start a scene's network from random states and count those that synchronise.
 
-    The state of every oscillator is uniform in `ranges`, independent of the others.  The result depends on the seed
-    and not on the workers, and the first starts of a larger sample are those of a smaller one.
+    The state of every oscillator is drawn uniformly from `ranges`, independently of the other oscillators. The result
+    depends on the seed, but not on the workers. A larger sample begins with the starts of a smaller one.
 
     Parameters
     ----------
     scene : Scene
-        The network; its records are not used, its stop ends cells.
+        The network. The records of the scene are ignored; its stop ends cells.
     samples : int
         Number of starts.
     ranges : mapping of str to (float, float), optional
-        Lowest and highest value of a component (default: -1 and 1 for all components); a component
-        that is not named starts as in the scene.
+        Lowest and highest initial value of each component (default: -1 and 1 for all components). If
+        ranges are given, all other components start as in the scene.
     tolerance : float, optional
-        A start is synchronous if its mean synchronisation error over the window is below this; by default a thousandth of
-        the extent of the synchronous motion, for each component too.
+        A start is synchronous if its mean synchronisation error over the window is below this value. By default a
+        thousandth of the extent of the synchronous motion; the error of each component is then tested too.
     transient, window : float, optional
         In the scene's unit of time; by default as for a `Criterion`.
     seed : int, optional
@@ -230,13 +228,13 @@ def basin(
     Returns
     -------
     Basin
-        A cell takes at most a hundred times the steps of the synchronous motion; cells that need more have escaped or are
-        not finished.
+        A cell takes at most a hundred times as many steps as the synchronous motion. A cell that needs more steps
+        counts as escaped or not finished.
 
     Raises
     ------
     ValueError
-        If a component is unknown, a range is empty, or a number makes no sense, and for a scene with
+        If a component is unknown, if a range is empty, if a number is out of range, or if the scene has
         axes or draws.
     TypeError
         If the number of samples is not whole.
@@ -248,7 +246,7 @@ def basin(
     scene = random_starts(scene, samples, ranges, partial.seed or 0)
     used = resolved(partial, scene, lambda atol: _motion(scene, partial, atol, execution))
 
-    # all starts, judged by how their cells end
+    # run all starts, and determine the fate of each from the end of its cell
     settings = {"window": used.window, "max_steps": used.max_steps, "atol": used.atol or scene.given["atol"]}
     outcome, start = _run(scene.replace(transient=used.transient, **settings), np.arange(samples), execution)
     error, fate = errors(outcome, used, scene.equations), np.full(samples, FATES.index(Fate.UNFINISHED))
@@ -258,7 +256,7 @@ def basin(
     fate[finished] = FATES.index(Fate.OTHER)
     fate[finished & (error < used.tolerance)] = FATES.index(Fate.SYNCHRONOUS)
 
-    # of the others, which are still approaching: their errors after half of the transient, and the exponent
+    # find the starts that are still approaching, by their errors after half of the transient and by the exponent
     apart, earlier = np.flatnonzero(fate == FATES.index(Fate.OTHER)), np.full(samples, np.nan)
     single = scene.replace(axes=(), zipped=False, stop=None)
     if not len(apart):
@@ -281,12 +279,12 @@ def _run(scene: Scene, cells: np.ndarray, execution: Execution) -> tuple[Outcome
 
 
 def _unreduced(scene: Scene) -> ReducedScene:
-    """A scene with all its nodes, which start apart."""
+    """Return a scene without reduction: all nodes have different starts."""
     return replace(reduce_scene(scene, reduce=False), jumps=True)
 
 
 def _motion(scene: Scene, partial: Criterion, atol: float | None, execution: Execution) -> SynchronousMotion:
-    """The motion from the state of the scene's first oscillator."""
+    """Return the synchronous motion from the state of the scene's first oscillator."""
     unit = scene.replace(transient=1.0, window=1.0, atol=atol or scene.given["atol"])
     planner, equations = Planner(unit), scene.equations
     spread = spread_of(equations, planner.rows(np.arange(min(scene.cells, 100))).start)
@@ -297,12 +295,15 @@ def _motion(scene: Scene, partial: Criterion, atol: float | None, execution: Exe
 
 
 def _length(scene: Scene, used: AppliedCriterion) -> float:
-    """Transient and window in non-dimensional time."""
+    """Return the length of transient and window together, in non-dimensional time."""
     return (used.transient + used.window) * ((scene.period or 1.0) if scene.time_unit == TimeUnit.PERIOD else 1.0)
 
 
 def _exponent(scene: Scene, used: AppliedCriterion, execution: Execution) -> tuple[float, float]:
-    """The largest transversal exponent, as precise as a transient can resolve, and its error; NaN if there is none."""
+    """Return the largest transversal exponent and its error; NaN if there is none.
+
+    The precision is the least exponent that shows within the transient.
+    """
     try:
         certificate = certify(scene, precision=0.5 / _length(scene, used), periods=LONGEST, workers=execution.workers)
     except (ValueError, FloatingPointError):
@@ -313,23 +314,23 @@ def _exponent(scene: Scene, used: AppliedCriterion, execution: Execution) -> tup
 def _approaching(
     error: np.ndarray, earlier: np.ndarray, used: AppliedCriterion, length: float, exponent: float, stderr: float
 ) -> np.ndarray:
-    """True for starts (samples,) that are not synchronous but may only need more time.
+    """Return whether starts (samples,) that are not synchronous may synchronise later.
 
-    After a long transient they do if their errors fall at half the pace of the exponent, or by a factor e.
+    After a long transient, the error of such a start must fall at half the rate of the exponent, or by a factor e.
     """
     if math.isnan(exponent):
         return np.asarray(error < earlier / math.e)
     fastest = 2.0 * stderr - exponent
     if fastest <= 0.0:
         return np.zeros(len(error), dtype=bool)
-    # errors fall at most by exp(fastest) in a unit of time: too little to decide after a short transient
+    # an error falls by at most exp(fastest) in a unit of time: a short transient cannot decide
     if fastest * length < math.log(max(used.size / used.tolerance, 1.0)):
         return np.ones(len(error), dtype=bool)
     return np.asarray(error < earlier * math.exp(max(0.25 * min(exponent, 0.0) * length, -1.0)))
 
 
 def random_starts(scene: Scene, samples: int, ranges: Mapping[str, Range] | None = None, seed: int = 0) -> Scene:
-    """Return the scene with a cell for each of `samples` random starts; `ranges` as for `basin`."""
+    """Return the scene with one cell for each of `samples` random starts; `ranges` as for `basin`."""
     box = _box(scene, ranges)
     names = [f"{component}_{i + 1}" for component in box for i in scene.equations.holders(component)]
     counts = [len(scene.initial[component]) for component in box]
@@ -349,7 +350,7 @@ def _check(scene: Scene, samples: object, tolerance: object, confidence: object)
 
 
 def _box(scene: Scene, ranges: Mapping[str, Range] | None) -> dict[str, Range]:
-    """The ranges in the order of the components, checked; the slip state of a contact follows from the other states."""
+    """Check the ranges, and return them in the order of the components, without the slip state of a contact."""
     names = tuple(name for name in scene.components if name != SLIP.name)
     if ranges is None:
         return dict.fromkeys(names, (-1.0, 1.0))

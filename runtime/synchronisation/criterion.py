@@ -1,4 +1,4 @@
-"""When a coupling counts as synchronous: the starts, their times, and the largest error."""
+"""Define the criterion of synchronisation: starts, transient and window, and the largest error."""
 
 from __future__ import annotations
 
@@ -34,47 +34,51 @@ __all__ = [
 ]
 
 TOLERANCE, REACH = 1e-3, 0.5
-"""Largest error, and reach of the starts, relative to the extent of the synchronous motion (a choice)."""
+"""Default tolerance and reach, relative to the extent of the synchronous motion (a choice)."""
 
 TIMES = {"transient": 1000.0, "window": 100.0}
-"""Transient and window: in periods of the drive, without one in times in which the motion turns by a radian."""
+"""Default transient and window, in periods of the drive; without a drive, in times in which the motion turns by a
+radian."""
 
 PASSES = 4
-"""Most repeated measurements of a motion that the steps did not resolve."""
+"""A motion that the steps do not resolve is measured at most this often, with smaller and smaller tolerances."""
 
 EFFORT = 100.0
-"""Most steps of a cell, relative to those of the synchronous motion in the same time (a choice)."""
+"""Largest number of steps of a cell, relative to that of the synchronous motion in the same time (a choice)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Criterion:
-    """When a value of sigma counts as synchronous.
+    """Conditions under which a value of sigma counts as synchronous.
 
-    From `starts` different initial states (the scene's own, and copies of it moved as a whole by a
-    random amount of up to `reach` in the position), at least half must end with a mean
-    synchronisation error below `tolerance`, averaged over `window` after a transient of `transient`.
-    Near the ends of a range of chaotic motion single starts synchronise or burst by chance; their
-    majority does not depend on one of them.
+    The network runs from `starts` initial states: the scene's own, and copies in which the positions of all
+    oscillators are moved by the same random amount, at most `reach`. A value counts as synchronous if at least
+    half of the starts end with an error below `tolerance`. The error is the mean synchronisation error over
+    `window` after the transient. Near the ends of a range of chaotic motion single starts synchronise or burst
+    by chance, so that several starts decide.
 
-    Distances between oscillators are those of the scene's own start in all of them.  Where oscillators and links are
-    linear, a mode that is absent from these distances grows from rounding alone: `thresholds` warns of it.
+    All starts have the same distances between oscillators. If oscillators and links are linear, a mode that is absent
+    from these distances grows from rounding errors alone; `thresholds` warns of such a mode.
 
-    Fields that are None follow the motion and the scene; results hold the numbers that were used (`AppliedCriterion`).
+    A field that is None follows from the motion and the scene. Results store the numbers that were used
+    (`AppliedCriterion`).
 
     Parameters
     ----------
     tolerance : float, optional
-        In units of the state.  By default a thousandth of the extent of the synchronous motion, for the mean error and for
-        the error of each component at the end of the window.
+        Largest error, in units of the state. By default a thousandth of the extent of the synchronous motion, both for
+        the mean error and for the error of each component at the end of the window.
     starts : int
         Number of initial states.
     reach : float, optional
-        In units of the position, by default half of the extent of the synchronous motion in it.
+        Largest displacement of a start, in units of the position. By default half of the position's extent in the
+        synchronous motion.
     transient, window : float, optional
-        In the scene's unit of time.  By default those of the scene if they are not the default of `Scene`, else 1000 and
-        100 periods of the drive; without a drive, 1000 and 100 times in which the motion turns by a radian.
+        Transient and window in the scene's unit of time. By default those of the scene, if they differ from the
+        defaults of `Scene`; otherwise 1000 and 100 periods of the drive or, without a drive, 1000 and 100 times the
+        time in which the motion turns by a radian.
     rtol, seed : float, int, optional
-        Those of the scene by default.
+        Relative tolerance and seed; by default those of the scene.
 
     See Also
     --------
@@ -118,16 +122,16 @@ class AppliedCriterion(Criterion):
     window: float
     rtol: float
     seed: int
-    extent: tuple[float, ...]  # of the synchronous motion in each compared component
+    extent: tuple[float, ...]  # extent of the synchronous motion in each compared component
     relative: bool = (
-        False  # whether the tolerance follows from it and each component is judged, not the mean error alone
+        False  # True if the tolerance follows from the extent; the error of each component is then tested too
     )
     max_steps: int = 10_000_000  # most steps of a cell: EFFORT times those of the synchronous motion
-    atol: float | None = None  # absolute tolerance of the steps; None for that of the scene
+    atol: float | None = None  # absolute tolerance of the steps; None: that of the scene
 
     @property
     def size(self) -> float:
-        """Extent of the synchronous motion in all components, measured as a synchronisation error is."""
+        """Extent of the synchronous motion in all components together, measured like a synchronisation error."""
         return math.hypot(*self.extent)
 
     def text(self, scene: Scene) -> str:
@@ -144,28 +148,28 @@ PAPER = AppliedCriterion(1e-3, 8, 0.4, 1000.0, 100.0, 1e-8, 0, (0.8, 0.5))
 """The criterion of docs/thresholds.md, in the units of the friction oscillator."""
 
 QUICK = Criterion(starts=5, transient=400.0, window=50.0, rtol=1e-6)
-"""A criterion for a first look, at a ninth of the effort.
+"""A criterion for a first result, at a ninth of the effort.
 
-Chains of two, three and four oscillators of the paper at omega = 1.15 and 1.40: ends of ranges at rtol = 1e-6 and 1e-8
-differ by as much as with two seeds of the starts, and steps are 2.3 times fewer.
+Test: chains of two, three and four oscillators of the paper at omega = 1.15 and 1.40. The ends of ranges at rtol = 1e-6
+and 1e-8 differ by no more than those of two seeds, and rtol = 1e-6 needs 2.3 times fewer steps.
 """
 
 
 IN_CRITERION = {
     each.name: f"it is one of the criterion; write criterion=Criterion({each.name}=…)" for each in fields(Criterion)
 }
-"""Keywords that functions with a criterion refuse, and the reason."""
+"""Keywords that functions with a criterion do not accept, each with the reason for the error message."""
 
 
 def checked(criterion: Criterion | None) -> Criterion:
-    """Return the criterion, or the default one for None; TypeError for anything else."""
+    """Return the criterion, or the default criterion for None; raise TypeError for anything else."""
     if criterion is None:
         return Criterion()
     return check_instance("criterion", criterion, Criterion, "a Criterion, e.g. Criterion(starts=4)")
 
 
 def preset(criterion: Criterion, scene: Scene) -> Criterion:
-    """Return the criterion with times, rtol and seed of the scene where it has none."""
+    """Return the criterion with the scene's times, rtol and seed in place of fields that are None."""
     of_scene: dict[str, Any] = {"rtol": scene.rtol, "seed": scene.seed}
     for name, periods in TIMES.items():
         value = getattr(scene, name)
@@ -177,7 +181,7 @@ def preset(criterion: Criterion, scene: Scene) -> Criterion:
 
 
 def applied(criterion: Criterion, motion: SynchronousMotion, scene: Scene) -> AppliedCriterion:
-    """Return a criterion (`preset`) with the numbers that follow from the synchronous motion."""
+    """Return a criterion from `preset`, with the numbers that follow from the synchronous motion."""
     values: dict[str, Any] = {each.name: getattr(criterion, each.name) for each in fields(Criterion)}
     for name, radians in TIMES.items():
         if values[name] is None:
@@ -202,7 +206,10 @@ def applied(criterion: Criterion, motion: SynchronousMotion, scene: Scene) -> Ap
 def resolved(
     criterion: Criterion, scene: Scene, measure: Callable[[float | None], SynchronousMotion]
 ) -> AppliedCriterion:
-    """Return a criterion (`preset`) with the numbers of the motion, measured again until the absolute tolerance resolves it."""
+    """Return a criterion from `preset`, with the numbers that follow from the motion.
+
+    `measure` is called again until the absolute tolerance resolves the motion.
+    """
     used = applied(criterion, measure(None), scene)
     for _ in range(PASSES):
         if used.atol is None:
@@ -214,10 +221,10 @@ def resolved(
 
 
 def errors(outcome: Outcome, criterion: AppliedCriterion, equations: Equations) -> np.ndarray:
-    """Return the errors (cells,) to compare with the tolerance.
+    """Return the errors (cells,) for the comparison with the tolerance.
 
-    They are the mean errors; if the tolerance follows from the motion, the error of a small component at the end, in units
-    of its extent, counts too.
+    The errors are the mean errors. If the tolerance follows from the motion, the final error of each component, in
+    units of its extent, counts too: a component of small extent hardly changes the mean error.
     """
     if not criterion.relative:
         return outcome.error
@@ -229,6 +236,6 @@ def errors(outcome: Outcome, criterion: AppliedCriterion, equations: Equations) 
 
 
 def offsets(criterion: AppliedCriterion) -> np.ndarray:
-    """Return the displacements (starts,): 0, then random ones."""
+    """Return the displacements (starts,): 0, followed by random numbers."""
     random = np.random.default_rng(criterion.seed)
     return np.concatenate([[0.0], random.uniform(-criterion.reach, criterion.reach, criterion.starts - 1)])

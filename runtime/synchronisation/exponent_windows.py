@@ -1,4 +1,4 @@
-"""Windows of sigma from transversal exponents, or the reason why there are none."""
+"""Compute windows of sigma from transversal exponents, or the reason why there are no exponents."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ class ExponentWindows:
     intervals : tuple of (float, float)
         Lower and upper end of each window, in ascending order.
     errors : tuple of (float, float)
-        Errors of the ends: 0 at sigma = 0; infinite at an end of the grid, beyond which nothing is known, and if the average
-        is too short for an estimate.
+        Errors of the ends: 0 at sigma = 0, infinite at an end of the grid, and infinite if the average is too short for
+        an estimate.
     absent : str
-        Why there are no exponents of the network; empty if there are.
+        Reason why there are no exponents of the network; empty if there are exponents.
     strengths, values : tuple of float
-        Strengths alpha and exponents at them.
+        Strengths alpha, and the exponents at these strengths.
     beyond : tuple of float
-        Ends of windows that are ends of the grid: the windows may go on.
+        Ends of windows that are ends of the grid; the windows may extend beyond.
     """
 
     intervals: tuple[Interval, ...] = ()
@@ -69,7 +69,7 @@ class ExponentWindows:
         return np.interp(alpha, self.strengths, self.values)
 
     def text(self, grid_ends: Collection[float] = ()) -> str:
-        """Return the windows with their errors and dots at ends of the grid, or the reason why there are none."""
+        """Return the windows as text with errors, and dots at ends of the grid, or the reason why there are none."""
         ends = (*self.beyond, *grid_ends)
         return f"not computed: {self.absent}" if self.absent else interval_text(self.intervals, self.errors, ends)
 

@@ -1,4 +1,4 @@
-"""Modes of a linear network that are absent from its start."""
+"""Find modes of a linear network that are absent from the network's start."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.scenes.scene import Scene
 
 ROUNDING = 1e-12
-"""Largest part of the distances between oscillators that is rounding (a choice)."""
+"""A mode is absent if its share of the distances between oscillators is below this number (a choice)."""
 
 
 def hidden_modes(scene: Scene) -> tuple[str, ...]:
-    """Return a sentence if some transversal modes are absent from the start of a linear network.
+    """Return a warning if some transversal modes are absent from the start of a linear network, else nothing.
 
-    The modes of linear oscillators with linear links move independently: one that is absent from the start is excited by
-    rounding alone, and its growth is noticed late. The mode (1, -2, 1) is absent from the default start of three in a
-    chain, 0.30, 0.28, 0.26. Nonlinear networks pass motion from mode to mode; all-to-all networks have a single
-    transversal eigenvalue; one-way links are not examined.
+    The modes of linear oscillators with linear links move independently. A mode that is absent from the start is
+    excited by rounding alone, so that its growth shows late. Example: the mode (1, -2, 1) is absent from the default
+    start of a chain of three, 0.30, 0.28, 0.26. There is no warning for nonlinear networks, in which modes excite one
+    another, for all-to-all networks, which have a single transversal eigenvalue, and for one-way links, which are not
+    examined.
     """
     graph = scene.topology
     if graph.all_to_all is not None or not graph.symmetric or not _linear(scene.equations):
@@ -46,7 +47,7 @@ def hidden_modes(scene: Scene) -> tuple[str, ...]:
 
 
 def _linear(equations: Equations) -> bool:
-    """True if the rates of all oscillators are linear in their states, and those of links in the states of both ends."""
+    """Return True if oscillators are linear in their states, and links linear in the states of both ends."""
     nodes = ((node.state, (node.jacobian(), node.inertia)) for node in equations.nodes)
     edges = (
         ((*edge.here, *edge.there), (edge.jacobian_here(), edge.jacobian_there(), *edge.inertia))

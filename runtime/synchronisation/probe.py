@@ -1,12 +1,11 @@
-"""The three-oscillator universal probe: which complex strengths of a mode synchronise, by direct
-simulation.
+"""Find by direct simulation the complex strengths of a mode that synchronise: the three-oscillator universal probe.
 
-Three cells in a ring with the weights a and b in its two directions have the transversal
-eigenvalues gamma = -(3/2)(a + b) ± i (sqrt(3)/2)(a - b).  With alpha + i beta = -sigma gamma and
-sigma = 1, a and b are alpha/3 ± beta/sqrt(3): the weights reach every point of the complex plane,
-and a network whose -sigma gamma_k all lie where the three synchronise should synchronise too,
-one-way links included (Fink, Johnson, Carroll, Mar & Pecora, Phys. Rev. E 61, 5080 (2000)).  a and
-b are parameters of one kernel, so that a whole plane needs one compilation.
+Three oscillators in a ring, with the weights a and b of links in the two directions, have the transversal
+eigenvalues gamma = -(3/2)(a + b) ± i (sqrt(3)/2)(a - b). With alpha + i beta = -sigma gamma and sigma = 1, the
+weights are a, b = alpha/3 ± beta/sqrt(3), so that the ring reaches every point of the complex plane. Another
+network should synchronise if the ring synchronises at all its points -sigma gamma_k, even with one-way links
+(Fink, Johnson, Carroll, Mar & Pecora, Phys. Rev. E 61, 5080 (2000)). The weights a and b are parameters of the
+kernel, so that one kernel serves the whole plane.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ from .trials import Trials
 
 MODE_ALPHA = sp.Symbol("mode_alpha", real=True)
 MODE_BETA = sp.Symbol("mode_beta", real=True)
-"""Real and imaginary part of a mode's strength alpha + i beta = -sigma gamma."""
+"""Symbols of the real and imaginary part of a mode's strength alpha + i beta = -sigma gamma."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -57,9 +56,9 @@ class Probe(Labelled):
     beta: np.ndarray = field(repr=False)
     error: np.ndarray = field(
         repr=False
-    )  # median over the starts of the mean synchronisation error; infinite without an end
+    )  # median over the starts of the mean synchronisation error; infinite for cells that did not finish
     share: np.ndarray = field(repr=False)  # part of the starts that synchronised
-    status: np.ndarray = field(repr=False)  # (…, starts): how each cell ended
+    status: np.ndarray = field(repr=False)  # (…, starts): status of each cell
 
     @property
     def data(self) -> xr.Dataset:
@@ -77,7 +76,7 @@ class Probe(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """Scene, strengths, number of those that synchronise, and criterion."""
+        """Scene, strengths, number of strengths that synchronise, and criterion."""
         return (
             ("scene", scene_text(self.scene)),
             ("strengths", f"{self.alpha.size}: alpha {range_text(self.alpha)}, beta {range_text(self.beta)}"),
@@ -87,7 +86,7 @@ class Probe(Labelled):
 
     @property
     def synchronous(self) -> np.ndarray:
-        """True if at least half of the starts synchronised."""
+        """True for each strength at which at least half of the starts synchronised."""
         return self.share >= 0.5
 
 
@@ -109,11 +108,11 @@ def universal_probe(
     Parameters
     ----------
     scene : Scene
-        Oscillator, coupling and parameters; its network and sigma are not used. The three start on the line through the
-        starts of its first two oscillators.
+        Oscillator, coupling and parameters; the network and sigma of the scene are not used. The three oscillators
+        start on the line through the starts of the scene's first two oscillators.
     alpha, beta : array_like
-        Real and imaginary part of the strengths, broadcast against each other; negative numbers are
-        allowed.
+        Real and imaginary parts of the strengths, positive or negative, which are broadcast against each
+        other.
     criterion : Criterion, optional
         Starts, tolerance and times, as for `thresholds`.
     workers, executor, show_progress, progress
@@ -129,8 +128,8 @@ def universal_probe(
     Raises
     ------
     ValueError
-        If strengths are missing or not finite, if the scene has no coupling, a stop, draws, or axes but
-        that of sigma, or if its coupling is not proportional to sigma and to the weight of a link.
+        If strengths are missing or not finite, if the scene has no coupling, if it has a stop, draws, or
+        axes other than sigma, or if its coupling is not proportional to sigma and to the weight of a link.
     """
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     real, imaginary = _broadcast(alpha, beta)
@@ -138,7 +137,7 @@ def universal_probe(
     if scene.varied:
         scene.equations.expect_alike("the three-oscillator probe")
     partial = preset(criterion, scene)
-    # the ring in units of time, and its kernel; both parts of the strength are parameters of it
+    # build the ring; the real and imaginary part of the strength are parameters of its kernel
     ring = scene.replace(
         record=("sync_error",),
         topology=topology("ring", 3),
@@ -163,7 +162,7 @@ def universal_probe(
             times, apart = (partial.transient, partial.window), spread_of(equations, plain.start[:1])
             return measure_motion(few, lambda rows: rows, equations, one, times, apart)
 
-    # the criterion follows the motion; then all strengths and starts are cells of one round
+    # complete the criterion from the motion, then run all strengths and starts as cells of one round
     used = resolved(partial, ring, measure)
     atol = ring.given["atol"] if used.atol is None else used.atol
     ring = ring.replace(transient=used.transient, window=used.window, max_steps=used.max_steps, atol=atol)
@@ -178,16 +177,16 @@ def universal_probe(
 
 
 def ring_of_three(equations: Equations) -> Equations:
-    """Return three nodes in a ring, with links of the weight alpha/3 + beta/sqrt(3) one way and alpha/3 - beta/sqrt(3) back.
+    """Return a ring of three nodes; links have the weight alpha/3 + beta/sqrt(3) one way, alpha/3 - beta/sqrt(3) back.
 
-    The parameters `mode_alpha` and `mode_beta` replace sigma; the weight of a link, 1 or -1, is its direction.
+    The parameters `mode_alpha` and `mode_beta` replace sigma; the topology's weights, 1 and -1, give the direction.
     """
     equations.expect_alike("the three-oscillator probe")
     edge = equations.edge
     if edge is None:
         raise ValueError("these equations have no coupling; the probe needs links")
     sigma = strength(edge, equations.node.parameters)
-    # a link must be its strength times its weight times a function that is zero between equal states
+    # check that the rates of a link are sigma times the weight times a function that is zero between equal states
     if not edge.diffusive:
         raise ValueError("a link acts between equal states, so complete synchronisation is no solution of this network")
     unit = {edge.weight: sp.S.One, sigma: sp.S.One}
@@ -208,7 +207,7 @@ def ring_of_three(equations: Equations) -> Equations:
 
 
 def _broadcast(alpha: ArrayLike, beta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """Both parts of the strengths in one shape; ValueError if they are empty, not finite, or do not fit together."""
+    """Return alpha and beta in one shape; ValueError if they are empty, not finite, or cannot be broadcast."""
     parts = numbers("alpha", alpha), numbers("beta", beta)
     for part in parts:
         if part.size == 0:
@@ -224,7 +223,10 @@ def _broadcast(alpha: ArrayLike, beta: ArrayLike) -> tuple[np.ndarray, np.ndarra
 
 
 def _rows(planner: Planner, names: tuple[str, ...], alpha: np.ndarray, beta: np.ndarray, moves: np.ndarray) -> CellRows:
-    """Rows of every strength and start, the starts fastest; `moves` (starts,) displace all oscillators alike in the position."""
+    """Return a row for every strength and start, the starts fastest.
+
+    `moves` (starts,): displacements of the positions of all oscillators together.
+    """
     one, scene, starts = planner.rows(np.arange(1)), planner.scene, len(moves)
     count = len(alpha) * starts
     values = {**scene.parameters, MODE_ALPHA.name: 0.0, MODE_BETA.name: 0.0}

@@ -1,8 +1,8 @@
-"""The synchronous motion of a network: its extent, the time of a turn, and the steps it takes.
+"""Measure the synchronous motion of a network: extent, time of a turn, and number of steps.
 
-Tolerances and times of a criterion follow the motion, so that results depend on no unit of states or time.  The kernel
-that runs the cells measures it, at times far apart: contacts, jumps and unequal nodes have no orbit with deviations,
-which `stability.motion` follows step by step.
+The tolerance and the times of a criterion follow from the motion, so that results do not depend on the units of states
+and time. The motion is measured with the kernel that runs the cells, which samples states at times far apart.
+`stability.motion` follows an orbit step by step, but cannot integrate contacts, jumps and unequal nodes.
 """
 
 from __future__ import annotations
@@ -25,16 +25,18 @@ from ..support.status import Status
 from .trials import Outcome, Trials
 
 SAMPLES = 64
-"""States that are sampled in a stretch of the motion (a choice)."""
+"""Number of states that are sampled in a stretch of the motion (a choice)."""
 
 REST = 1e-5
-"""A component rests if it moves by less than this part of its motion from the start on (a choice)."""
+"""A component is at rest if its later motion is below this part of its whole motion (a choice)."""
 
 SEEN = 1e-7
-"""Movements below this part of the size of a state are errors of the steps (a choice)."""
+"""Motion below this part of the size of a state counts as an error of the steps (a choice)."""
 
 TURNS, ROUNDS, LONGER = 2.0, 20, 2.0
-"""Turns of an undriven motion that give its pace; most stretches of time that are tried, each LONGER times the last."""
+"""TURNS: number of turns of an undriven motion that determine the time of a turn. ROUNDS: most stretches of time that
+are
+tried, each LONGER times as long as the one before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,14 +45,14 @@ class SynchronousMotion:
 
     extent: (
         np.ndarray
-    )  # (compared components,): less the drift; of a component that comes to rest, that of its approach
+    )  # (compared components,): without drift; for a component that comes to rest, the extent of its approach
     radian: float  # time in which the motion turns by a radian
-    pace: float  # steps in a unit of time
+    pace: float  # number of steps in a unit of time
     unit: float  # the scene's unit of time
 
     @property
     def size(self) -> float:
-        """The extent of all components, as the synchronisation error is one distance."""
+        """The extent of all components together, as one distance, like the synchronisation error."""
         return float(np.linalg.norm(self.extent))
 
 
@@ -68,7 +70,10 @@ def alike(equations: Equations, row: CellRows) -> CellRows:
 
 
 def first_starts(scene: Scene, count: int) -> dict[str, list[float]] | None:
-    """Return starts of `count` oscillators that continue the line through the first two of a scene; None for the default start."""
+    """Return starts of `count` oscillators on the line through the starts of a scene's first two oscillators.
+
+    Return None if the scene has the default start.
+    """
     if scene.given["initial"] is None:
         return None
     first = {name: (*values, values[0])[:2] for name, values in scene.initial.items() if name != SLIP.name}
@@ -76,7 +81,7 @@ def first_starts(scene: Scene, count: int) -> dict[str, list[float]] | None:
 
 
 def spread_of(equations: Equations, start: np.ndarray) -> np.ndarray:
-    """Return the largest distances (components,) between the oscillators of some starts (cells, dimension)."""
+    """Return the largest distance (components,) between oscillators in any of the starts (cells, dimension)."""
     return np.asarray(np.ptp(start[:, columns_of(equations)], axis=(0, 2)))
 
 
@@ -88,7 +93,7 @@ def measure_motion(
     times: tuple[float | None, float | None],
     apart: np.ndarray,
 ) -> SynchronousMotion:
-    """Measure the motion that begins with a row of the whole network. Shapes: apart (components,)."""
+    """Measure the motion that begins with a row of the unreduced network. Shapes: apart (components,)."""
 
     def sample(ends: np.ndarray) -> Outcome:
         spans = np.tile(row.spans, (len(ends), 1))
@@ -103,14 +108,14 @@ def measure_motion(
         fastest = float(fastest_rates(equations, state[None], row.numbers[0])[0])
         return 1.0 / fastest if 0.0 < fastest < math.inf else math.inf
 
-    # times: those that are given, else multiples of a radian
+    # choose transient and window: the given times, else multiples of the time of a radian
     radian = period / (2.0 * math.pi) if period else _radian(sample, columns, row.start[0], inverse)
     transient, window = (
         radian * radians if time is None else time * unit for time, radians in zip(times, (1000.0, 100.0), strict=True)
     )
-    # states from the start on, and after the transient at times with golden-ratio spacing, which match no period
+    # sample states from the start on, and after the transient at times with golden-ratio spacing, which fit no period
     early = window * np.arange(1, SAMPLES + 1) / SAMPLES
-    turned = max(window, 4.0 * math.pi * radian)  # in less than a turn, the extent depends on the phase
+    turned = max(window, 4.0 * math.pi * radian)  # two turns: in less than one, the extent depends on the phase
     late = transient + turned * (np.arange(1, SAMPLES + 1) * (math.sqrt(5.0) - 1.0) / 2.0 % 1.0)
     outcome = sample(np.concatenate([early, late]))
     paces = np.where(outcome.status == Status.FINISHED, outcome.steps / np.concatenate([early, late]), 0.0)
@@ -125,7 +130,7 @@ def _radian(
     start: np.ndarray,
     inverse: Callable[[np.ndarray], float],
 ) -> float:
-    """The time in which an undriven motion turns by a radian, else the inverse of its fastest rate, else 1."""
+    """Return the time in which an undriven motion turns by a radian; without turns, 1 over its fastest rate, or 1."""
     least = inverse(start)
     length = least if math.isfinite(least) else 1.0
     for _ in range(ROUNDS):
@@ -148,14 +153,17 @@ def _radian(
 
 
 def _without_drift(time: np.ndarray, states: np.ndarray, first: int) -> np.ndarray:
-    """States (times, …) less the least-squares line through those from the `first` on."""
+    """Return states (times, …) minus the least-squares line through the states from index `first` on."""
     late = time[first:] - time[first:].mean()
     slope = np.tensordot(late, states[first:], axes=1) / (late @ late)
     return np.asarray(states - np.multiply.outer(time - time[first:].mean(), slope) - states[first:].mean(axis=0))
 
 
 def _extent(time: np.ndarray, states: np.ndarray, late: int) -> np.ndarray:
-    """Extents of components in the `late` last of some states (times, components, nodes), 0 where all nodes rest."""
+    """Return the extents of components in the last `late` states (times, components, nodes).
+
+    0 if all nodes are at rest.
+    """
     good = np.isfinite(states).all(axis=(1, 2))
     late = int(good[-late:].sum())
     if late < 3:

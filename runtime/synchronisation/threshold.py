@@ -1,12 +1,12 @@
-"""Ranges of sigma in which a network synchronises, found in three ways.
+"""Find the ranges of sigma in which a network synchronises, in three ways.
 
 1. `exponent_windows`: transversal exponents of all modes, with error bars, without transient or tolerance.
-2. `probe`, `project`: two oscillators are simulated over alpha = sigma |gamma|; their one non-zero eigenvalue
-   is -2.  Any network synchronises where every non-zero |sigma gamma_k| lies in the probe's ranges (Pecora &
-   Carroll, Phys. Rev. Lett. 80, 2109 (1998); Fink et al., Phys. Rev. E 61, 5080 (2000)).
-3. `simulate`: the network itself over sigma.
+2. `probe`, `project`: the probe, a pair of oscillators with the non-zero eigenvalue -2, is simulated over
+   alpha = sigma |gamma|. A network should synchronise where every non-zero |sigma gamma_k| lies in the probe's
+   ranges (Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); Fink et al., Phys. Rev. E 61, 5080 (2000)).
+3. `simulate`: the network itself is simulated over sigma.
 
-2 and 3 take a grid, judge its points by an `AppliedCriterion`, and refine the ends of ranges.
+Methods 2 and 3 test the points of a grid by an `AppliedCriterion`, and then refine the ends of ranges.
 """
 
 from __future__ import annotations
@@ -46,14 +46,15 @@ from .synchronous_motion import SynchronousMotion, alike, first_starts, measure_
 from .trials import Trials
 
 RESOLUTION, CLOSER, RELATIVE = 5e-4, 5.0, 1e-3
-"""Default width in sigma to which ends of ranges are refined: RESOLUTION, or RELATIVE sigma if that is more, and at most a
-step of the grid over CLOSER."""
+"""Ends of ranges are refined to a width in sigma: by default the larger of RESOLUTION and RELATIVE sigma, but at most
+the
+step of the grid divided by CLOSER."""
 
 LONGEST = 1e9
-"""Longest step of a grid, in widths to which ends are refined: ten rounds refine it."""
+"""Longest step of a grid, in units of the width to which ends are refined; ten rounds refine such a step."""
 
 PROBES = 257
-"""Least number of probed values of alpha, approximately (a choice)."""
+"""Approximate least number of values of alpha for the probe (a choice)."""
 
 Measure = Callable[[np.ndarray], np.ndarray]
 """Mean synchronisation errors (m, starts) at points (m,)."""
@@ -66,16 +67,16 @@ class Sweep:
     x: np.ndarray = field(repr=False)  # (m,): sigma or alpha
     error: np.ndarray = field(repr=False)  # (m,): median over the starts of the mean synchronisation error
     share: np.ndarray = field(repr=False)  # (m,): part of the starts that synchronised
-    intervals: tuple[Interval, ...]  # where at least half of them do, ends refined
+    intervals: tuple[Interval, ...]  # ranges in which at least half of the starts synchronised, with refined ends
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Thresholds(Labelled):
-    """Synchronous ranges of one network: from the exponents of its modes, measured directly, and predicted from the probe.
+    """Synchronous ranges of one network: from exponents, from direct simulation, and predicted from the probe.
 
-    The exponents decide.  Simulation and probe have a transient: near an end of a range errors fall so slowly that the end
-    depends on it; `warnings` names these ends.  `criterion` holds the numbers that were used.  `direct`, `predicted` and
-    `exponents` are in sigma, `probe` in alpha = sigma abs(gamma).
+    The exponents are the most reliable. Simulation and probe depend on the transient: near an end of a range, errors
+    fall too slowly for any transient. `warnings` names such ends. `criterion` stores the numbers that were used.
+    `direct`, `predicted` and `exponents` are ranges of sigma, `probe` contains ranges of alpha = sigma abs(gamma).
     """
 
     scene: Scene
@@ -136,7 +137,10 @@ class Thresholds(Labelled):
 
     @property
     def conjecture(self) -> float | None:
-        """The end of the range from no coupling up by the Wu-Chua conjecture; None if the probe's range has no such end."""
+        """Upper end of the range that begins at sigma = 0, by the Wu-Chua conjecture.
+
+        None if the probe has no such end.
+        """
         high = next((high for low, high in self.probe.intervals if low <= 0.0 < high), math.inf)
         if high >= self.probe.x[-1]:
             return None
@@ -148,8 +152,8 @@ class Thresholds(Labelled):
         Returns
         -------
         dict
-            intervals, probe (in alpha), predicted, exponents, exponent_errors, no_exponents and warnings.  An unknown error
-            is None, and so is no_exponents if there are exponents.
+            intervals, probe (in alpha), predicted, exponents, exponent_errors, no_exponents and warnings.  An unknown
+            error is None, and so is no_exponents if there are exponents.
         """
         return as_json(
             {
@@ -187,15 +191,14 @@ def thresholds(
     scene : Scene
         The network; its records, observables and sections are not used.
     sigma : sequence of float, optional
-        Increasing grid on which ranges are searched (default: `default_grid`); ranges between two of its values are
-        missed.  The probe's grid in alpha covers every sigma abs(gamma), with the spacing of this one.
+        Increasing grid on which ranges are searched (default: `default_grid`). A range between two neighbouring values
+        is missed. The probe's grid in alpha covers every sigma abs(gamma), with the spacing of this grid.
     resolution : float, optional
-        Ends of ranges are refined to this width in sigma, those of the probe to twice as much in
-        alpha.  By default it is 5e-4 or, if that is more, a thousandth of sigma, and at most a fifth of the step
-        of the grid.
+        Width in sigma to which ends of ranges are refined; for the probe, twice this width in alpha. By default
+        the larger of 5e-4 and a thousandth of sigma, but at most a fifth of the step of the grid.
     criterion : Criterion, optional
-        When a value of sigma counts as synchronous, with rtol, seed and transient of all cells; fields that are None
-        follow the scene and its motion.
+        Conditions for synchronisation, with rtol, seed and transient of all cells. Fields that are None follow from the
+        scene and its motion.
     precision, periods : float
         Standard error and longest average of the exponents, as for `exponents`.
     workers, executor, show_progress, progress
@@ -206,8 +209,8 @@ def thresholds(
     Returns
     -------
     Thresholds
-        Its warnings name a network in several parts, and the modes of a linear network that are absent from the start
-        (`hidden_modes`).
+        The field `warnings` reports a network of several parts, and modes of a linear network that are absent from the
+        start (`hidden_modes`).
 
     Raises
     ------
@@ -239,7 +242,7 @@ def thresholds(
 
 
 def _limited(result: Thresholds) -> Iterator[str]:
-    """Sentences about ends at which the exponent is negative, but errors take longer than the transient to fall."""
+    """Yield warnings of ends at which the exponent is negative, but the transient is too short for errors to fall."""
     used, scene = result.criterion, result.scene
     length = used.transient * ((scene.period or 1.0) if scene.time_unit == TimeUnit.PERIOD else 1.0)
     sizes = np.array([abs(value) for value in scene.spectrum.values if abs(value) > 0.0])
@@ -250,7 +253,7 @@ def _limited(result: Thresholds) -> Iterator[str]:
         ends = np.array(sorted({end for pair in ranges for end in pair} - grid))
         if not len(ends):
             continue
-        # an error falls from the extent of the motion to the tolerance in fall / |exponent|
+        # an error takes the time fall / |exponent| to fall from the extent of the motion to the tolerance
         exponent = result.exponents.at(np.outer(ends, sizes)).max(axis=1)
         late = (exponent < 0.0) & (-exponent * length < fall)
         if late.any():
@@ -265,14 +268,14 @@ def _limited(result: Thresholds) -> Iterator[str]:
 
 
 def default_grid(spectrum: Spectrum, step: float = 0.0025) -> np.ndarray:
-    """Return sigma from 0 to where the largest |sigma gamma| is 1.2, in at least 60 steps of at most `step`."""
+    """Return a grid of sigma from 0 to 1.2 / max |gamma|, in at least 60 steps of at most `step`."""
     highest = 1.2 / max(abs(value) for value in spectrum.values)
     return np.linspace(0.0, highest, max(math.ceil(highest / step), 60) + 1)
 
 
 def _probe_grid(sigma: np.ndarray, spectrum: Spectrum) -> np.ndarray:
-    """Values of alpha that cover sigma |gamma| for every mode, about PROBES or more."""
-    # sigma times the largest |gamma|, extended where others reach further
+    """Return at least about PROBES values of alpha that cover sigma |gamma| for every mode."""
+    # begin with sigma times the largest |gamma|, and extend the grid for modes of smaller |gamma|
     sizes = sorted({abs(value) for value in spectrum.values if abs(value) > 0.0}, reverse=True)
     grid = sigma * sizes[0]
     for size in (*sizes[1:], *([0.0] if spectrum.multiplicities[0] > 1 else [])):
@@ -283,7 +286,7 @@ def _probe_grid(sigma: np.ndarray, spectrum: Spectrum) -> np.ndarray:
 
 
 def _widths(x: np.ndarray, resolution: float | None) -> np.ndarray:
-    """Width (m - 1,) to which ends of ranges are refined in each step of a grid."""
+    """Return the width (m - 1,) to which ends of ranges are refined in each step of a grid."""
     if resolution is not None:
         return np.full(len(x) - 1, resolution)
     nearer = np.minimum(np.abs(x[1:]), np.abs(x[:-1]))
@@ -327,7 +330,7 @@ def probe(
 
 
 def _pair(scene: Scene) -> Scene:
-    """The two oscillators of the probe."""
+    """Return the scene of the probe's two oscillators."""
     return scene.replace(topology=topology("chain", 2), initial=first_starts(scene, 2), axes=())
 
 
@@ -338,7 +341,7 @@ def simulate(
     resolution: float | None = None,
     execution: Execution | None = None,
 ) -> Sweep:
-    """Sweep sigma by direct simulation: one kernel and one pool run the grid and all rounds that refine ends of ranges."""
+    """Sweep sigma by direct simulation; one kernel and one pool run the grid and all rounds of refinement."""
     x, execution = row("sigma", sigma, rising=True), execution or Execution()
     used = fitted(scene, x, criterion, execution)
     reduction = reduce_scene(cells_of(scene, x, used))
@@ -353,7 +356,7 @@ def simulate(
 
 
 def fitted(scene: Scene, sigma: np.ndarray, criterion: Criterion, execution: Execution) -> AppliedCriterion:
-    """Return a criterion with the numbers that follow from the motion of a scene's equal oscillators."""
+    """Return a criterion with the numbers that follow from the synchronous motion of a scene."""
     if isinstance(criterion, AppliedCriterion):
         return criterion
     partial, apart = preset(criterion, scene), spread_of(scene.equations, np.array([scene.y0]))
@@ -371,7 +374,7 @@ def fitted(scene: Scene, sigma: np.ndarray, criterion: Criterion, execution: Exe
 
 
 def judge(measure: Measure, x: np.ndarray, resolution: float | None, criterion: AppliedCriterion) -> Sweep:
-    """Return the verdicts on an increasing grid and the synchronous ranges, with ends refined to `resolution` in sigma."""
+    """Return the verdicts on an increasing grid, and the synchronous ranges with ends refined to `resolution`."""
 
     def share(mean_errors: np.ndarray) -> np.ndarray:
         return np.asarray((mean_errors < criterion.tolerance).mean(axis=1))
@@ -382,7 +385,7 @@ def judge(measure: Measure, x: np.ndarray, resolution: float | None, criterion: 
 
 
 def cells_of(scene: Scene, sigma: np.ndarray, criterion: AppliedCriterion) -> Scene:
-    """Return the scene with a cell for every sigma and start of a criterion, the starts fastest."""
+    """Return the scene with a cell for every sigma and every start of a criterion, the starts fastest."""
     position, moves = scene.components[0], offsets(criterion)
     axes: dict[str, np.ndarray] = {scene.strength: np.repeat(sigma, len(moves))}
     for i, x0 in enumerate(scene.initial[position]):
@@ -402,10 +405,11 @@ def cells_of(scene: Scene, sigma: np.ndarray, criterion: AppliedCriterion) -> Sc
 def project(
     ranges: Sequence[Interval], spectrum: Spectrum, highest: float = math.inf, lowest: float = 0.0
 ) -> list[Interval]:
-    """Return the sigma from `lowest` to `highest` for which every transversal sigma |gamma_k| lies in a range of alpha.
+    """Return the ranges of sigma, from `lowest` to `highest`, in which every sigma |gamma_k| lies in a range of alpha.
 
-    One zero eigenvalue belongs to the synchronous motion itself.  Every further one is a part of the network without
-    links to the others: it synchronises only if alpha = 0 is in a range (a drive alone locks the oscillators).
+    One zero eigenvalue belongs to the synchronous motion. Each further zero eigenvalue belongs to a part of the network
+    without links to the other parts. Such parts synchronise only if alpha = 0 is in a range, as when a drive alone
+    locks the oscillators.
     """
     allowed: list[Interval] = [(lowest, highest)]
     for value, multiplicity in zip(spectrum.values, spectrum.multiplicities, strict=True):
@@ -417,16 +421,16 @@ def project(
 
 
 def critical_ratio(spectrum: Spectrum) -> float:
-    """Return the largest over the smallest non-zero |gamma|: a bounded range of alpha must have at least this ratio."""
+    """Return the ratio of the largest to the smallest non-zero |gamma|; a bounded range of alpha needs this ratio."""
     sizes = [abs(value) for value in spectrum.values if abs(value) > 0.0]
     return max(sizes) / min(sizes)
 
 
 def wu_chua(sigma: float, first: Spectrum, second: Spectrum) -> float:
-    """Return the upper end of a range from zero coupling on for a second network, from its value for a first one.
+    """Return the upper end of the range from sigma = 0 on for a second network, from the end `sigma` for a first one.
 
-    sigma_m gamma_1(m) = sigma_n gamma_1(n), with gamma_1 the eigenvalue of largest modulus. Source: Wu & Chua, IEEE
-    Trans. Circuits Syst. I 43, 161 (1996).
+    The product of sigma and gamma_1, the eigenvalue of largest modulus, is the same for both networks. Source: Wu &
+    Chua, IEEE Trans. Circuits Syst. I 43, 161 (1996).
     """
     largest = [max(abs(value) for value in spectrum.values) for spectrum in (first, second)]
     return sigma * largest[0] / largest[1]

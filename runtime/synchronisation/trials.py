@@ -1,4 +1,4 @@
-"""Cells that run in rounds by one kernel on one pool of workers, for their mean synchronisation errors and ends."""
+"""Run cells in rounds with one kernel and one pool of workers; return mean synchronisation errors and final states."""
 
 from __future__ import annotations
 
@@ -27,22 +27,23 @@ from ..sweeps.errors import SweepFailed, SweepInterrupted, worker_lost
 from ..sweeps.pool import Task, WorkerPool
 
 Rows = Callable[[np.ndarray], CellRows]
-"""Lays out cells by their numbers (count,)."""
+"""A function that lays out cells, given their numbers (count,)."""
 
 
 class Outcome(NamedTuple):
     """Results of a round."""
 
     error: np.ndarray  # (cells,): mean synchronisation errors, infinite if a cell did not finish
-    status: np.ndarray  # (cells,): how they ended
+    status: np.ndarray  # (cells,): status of each cell
     end: np.ndarray  # (cells, dimension): states at the end, NaN if a cell did not finish
-    steps: np.ndarray  # (cells,)
+    steps: np.ndarray  # (cells,): number of steps
 
 
 class Trials:
-    """A compiled kernel of a problem and a pool of workers for any number of rounds; a context manager that closes the pool.
+    """A compiled kernel and a pool of workers for any number of rounds; as a context manager, close the pool.
 
-    The scene gives the length of a cell; `expand` turns the buffers of a reduced network into those of the unreduced one.
+    The scene gives the length of a cell. `expand` converts the buffers of a reduced network to those of the unreduced
+    one.
     """
 
     def __init__(
@@ -61,7 +62,10 @@ class Trials:
 
     @classmethod
     def of(cls, reduction: ReducedScene, execution: Execution) -> Trials:
-        """Return trials of a reduced scene, whose cells represent those of all rounds."""
+        """Return trials of a reduced scene.
+
+        The kernel is chosen for its cells, which represent the cells of all rounds.
+        """
         strongest = reduction.rows(reduction.planner.extremes())
         source = write_kernel(reduction, method=chosen_for_rows(reduction.scene, reduction.equations, strongest))
         control = control_of(reduction.planner, reduction.jumps)
@@ -75,7 +79,7 @@ class Trials:
         self.pool.close()
 
     def run(self, count: int, rows: Rows) -> Outcome:
-        """Run a round."""
+        """Run a round of `count` cells."""
         error, status = np.full(count, np.inf), np.full(count, int(Status.NOT_RUN))
         end, steps = np.full((count, self.scene.equations.dimension), np.nan), np.zeros(count, dtype=np.int64)
         reporter = self.execution.reporter(count)
