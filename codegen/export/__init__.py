@@ -1,6 +1,6 @@
-"""Equations to take away: source text that runs without this package.
+"""Export equations as source text that runs without this package.
 
-`to_python` for SciPy, `to_c` for C99, `to_numba` for NumbaLSODA; `synchain equations` prints them.
+`to_python` writes text for SciPy, `to_c` for C99, `to_numba` for NumbaLSODA; `synchain equations` prints these texts.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Statements on arrays of all nodes and all links at once, as NumPy has them, for networks of many equal nodes.
+"""Write NumPy statements on arrays of all nodes and all links, for networks of many equal nodes.
 
 State component c of all nodes is the slice [c*NODES, (c + 1)*NODES) of the state.  TARGET and SOURCE are the nodes at
-the ends of the links.  Sparse matrices are lists of entries: those at one place add up.
+the ends of the links.  Sparse matrices are lists of entries; entries with the same row and column are added.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def jacobian_arrays(model: Equations) -> list[Statement]:
     statements = ExportBody.of(nodes).statements(of_nodes, lambda entry, e: Store("values", slots[entry], e))
     if not links:
         return statements
-    # the values of the links are behind those of the nodes
+    # `values` holds the entries of the nodes first, then the entries of the links
     begin = len(nodes) * Name("NODES")
     behind = {entry: Slice(*(plus(begin, j * Name("LINKS")) for j in (k, k + 1))) for k, entry in enumerate(links)}
     statements.append(whole("LINKS", call("len", "TARGET")))
@@ -46,7 +46,7 @@ def jacobian_arrays(model: Equations) -> list[Statement]:
 
 
 def mass_arrays(model: Equations) -> list[Statement]:
-    """Return the statements that build the sparse mass matrix `mass_`: the identity, and what links add to it."""
+    """Return the statements that build the sparse mass matrix `mass_`: the identity plus the entries of links."""
     every = call("np.arange", "DIMENSION")
     rows: list[Expression] = [every]
     columns: list[Expression] = [every]
@@ -71,7 +71,7 @@ def entry_tables(model: Equations) -> list[str]:
     lines = ["NODE = np.arange(NODES)", *array_tables(model)]
     places = [(_element(e.row, "NODE"), _element(e.column, "NODE")) for e in node_jacobian(model)]
     places += map(_of_links, link_jacobian(model))
-    # rows in which M is not the identity: all of their rates depend on all that M couples
+    # rows in which M is not the identity: their rates depend on all states that M couples
     if heavy := sorted({entry.row for entry in link_mass(model)}):
         lines += NUMPY.lines([let("HEAVY", _joined([_element(r, "NODE") for r in heavy]))])
     empty = call("np.zeros", 0, "dtype=int")
@@ -80,7 +80,7 @@ def entry_tables(model: Equations) -> list[str]:
 
 
 def _loads(model: Equations) -> tuple[dict[sp.Symbol, Expression], dict[sp.Symbol, Expression]]:
-    """Return where the symbols of all nodes are, and those of both ends of all links."""
+    """Return two maps from symbols to array expressions: for all nodes, and for both ends of all links."""
     varied = {real(name): f"np.asarray({name}, dtype=float)" for name in model.varied}
     of_nodes: dict[sp.Symbol, Expression] = {s: Load("state", _block(c), None) for c, s in enumerate(model.node.state)}
     of_nodes |= {s: Name(text) for s, text in varied.items()}
@@ -95,21 +95,21 @@ def _loads(model: Equations) -> tuple[dict[sp.Symbol, Expression], dict[sp.Symbo
 
 
 def _element(component: int, nodes: str) -> Expression:
-    """Return the indices of a component of some nodes."""
+    """Return the indices, in the state, of one component of some nodes."""
     return element_of(component, "NODES", nodes)
 
 
 def _of_links(entry: Entry) -> tuple[Expression, Expression]:
-    """Return the rows and columns of an entry that links add."""
+    """Return the rows and columns, for all links, of an entry that links add to."""
     return _element(entry.row, "TARGET"), _element(entry.column, "SOURCE" if entry.source else "TARGET")
 
 
 def _block(k: int) -> Slice:
-    """Return the part of an array that holds block `k` of NODES numbers."""
+    """Return the slice of block `k` in an array of blocks of NODES numbers."""
     end = Name("NODES") if k == 0 else (k + 1) * Name("NODES")
     return Slice(Number(0) if k == 0 else Name("NODES") if k == 1 else k * Name("NODES"), end)
 
 
 def _joined(parts: Iterable[Expression]) -> Expression:
-    """Return arrays behind each other."""
+    """Return the concatenation of arrays."""
     return call("np.concatenate", f"[{', '.join(map(NUMPY.text, parts))}]")

@@ -1,8 +1,8 @@
-"""What one node or one link contributes to an exported text: tables of expressions, and assignments that compute them.
+"""Compute the contributions of one node or one link to an exported text: tables of expressions, and assignments.
 
-A network is written node by node and link by link up to LARGEST_UNROLLED nodes; beyond, one template of a node and one
-of a link are written in loops (C, Numba) or on arrays (Python).  Here `link` None is the template of all links, whose
-weight is a symbol.
+Networks of up to LARGEST_UNROLLED nodes are written node by node and link by link.  For larger networks, one template
+of a node and one template of a link are written as loops (C, Numba) or as array operations (Python).  `link` = None
+denotes the template of all links, whose weight is a symbol.
 
 With a mass matrix, M d(state)/dt = rhs, the Jacobian of the rates is M^-1 (d(rhs)/d(state) - d(M rates)/d(state)) at
 fixed rates.
@@ -27,20 +27,20 @@ from ..program.passes import real
 from ..program.statements import Statement, let
 
 LARGEST_UNROLLED = 8
-"""Networks up to this size are written node by node, larger ones as loops; a choice: 8 nodes are a page of text."""
+"""Largest number of nodes of a network that is written node by node.  A choice: 8 nodes fill a page of text."""
 
 LINE = 110
-"""Columns of the lines of a table."""
+"""Largest width of the lines of a table, in columns."""
 
 Linked: TypeAlias = tuple[Link, Edge]
-"""A link with its template."""
+"""A link and its template."""
 
 lower = Library()
-"""All exported languages have a mathematical library."""
+"""Translates SymPy expressions for exported languages, all of which have a mathematical library."""
 
 
 class Entry(NamedTuple):
-    """An entry of a matrix: a component of the node or target, and one of it or, if `source`, of the source of a link."""
+    """A matrix entry: row: component of a node (or target); column: component of the same node or of the `source`."""
 
     row: int
     column: int
@@ -48,21 +48,21 @@ class Entry(NamedTuple):
 
 
 Storing: TypeAlias = Callable[[Any, Expression], Statement]
-"""Makes the statement that stores a value: at a component of the state, or at an `Entry`."""
+"""Returns the statement that stores a value at a component of the state, or at an `Entry`."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExportBody:
-    """Temporaries in order, then results, each with the component or entry that it belongs to."""
+    """Temporaries in order of computation, and results, each with its component of the state or its `Entry`."""
 
     steps: tuple[tuple[sp.Symbol, sp.Expr], ...]
     results: tuple[tuple[Any, sp.Expr], ...]
 
     @classmethod
     def of(cls, table: Mapping[Any, Any]) -> ExportBody:
-        """Compute common parts once: w1, w2, …, which no symbol of a portable model is called."""
+        """Name common subexpressions w1, w2, …; no symbol of a portable model has such a name."""
         expressions = [sp.sympify(e) for e in table.values()]
-        # a temporary is a number: conditions of choices are hidden from the search, and shown again
+        # temporaries are numbers, so hide the conditions of choices during the search for common subexpressions
         conditions = {pair.cond for e in expressions for choice in e.atoms(sp.Piecewise) for pair in choice.args}
         ordered = sorted(conditions - {sp.true}, key=sp.default_sort_key)
         hidden = {condition: sp.Symbol(f"condition {k}") for k, condition in enumerate(ordered)}
@@ -73,12 +73,12 @@ class ExportBody:
         return cls(tuple((s, e.xreplace(shown)) for s, e in steps), tuple(zip(table, values, strict=True)))
 
     def uses(self, symbols: Iterable[sp.Symbol]) -> list[sp.Symbol]:
-        """Return those of the symbols that occur."""
+        """Return the symbols that occur in the temporaries or results."""
         used: set[sp.Symbol] = set().union(*(e.free_symbols for _, e in (*self.steps, *self.results)))
         return [s for s in symbols if s in used]
 
     def statements(self, loads: Mapping[sp.Symbol, Expression], storing: Storing) -> list[Statement]:
-        """Return statements that read the used symbols from `loads`, compute, and store."""
+        """Return statements that load the used symbols, compute the temporaries, and store the results."""
         statements: list[Statement] = [let(s.name, loads[s]) for s in self.uses(loads)]
         statements += [let(s.name, lower(e)) for s, e in self.steps]
         return statements + [storing(key, lower(e)) for key, e in self.results]
@@ -102,7 +102,7 @@ def node_jacobian(equations: Equations, i: int = 0) -> dict[Entry, sp.Expr]:
 
 
 def node_mass(equations: Equations, i: int = 0) -> dict[Entry, sp.Expr]:
-    """Return the entries of a node's block of M that are not those of the identity."""
+    """Return the entries of a node's block of M that differ from the identity."""
     block = equations.node_at(i).inertia
     entries = {Entry(r, c): e for r, row in enumerate(block) for c, e in enumerate(row)}
     return {entry: e for entry, e in entries.items() if e != sp.Integer(entry.row == entry.column)}
@@ -117,13 +117,13 @@ def node_rate_symbols(node: Node) -> tuple[sp.Symbol, ...]:
 
 
 def link_rhs(equations: Equations, link: Linked | None = None) -> dict[int, sp.Expr]:
-    """Return what a link adds to its target, by component."""
+    """Return the terms that a link adds to the right-hand side of its target, by component."""
     edge = _edge(equations, link)
     return {} if edge is None else _weighted(enumerate(edge.rhs), link)
 
 
 def link_jacobian(equations: Equations, link: Linked | None = None) -> dict[Entry, sp.Expr]:
-    """Return what a link adds to the Jacobian: in the block of its target, and in the block (target, source)."""
+    """Return the terms that a link adds to the Jacobian, in the blocks (target, target) and (target, source)."""
     edge = _edge(equations, link)
     if edge is None:
         return {}
@@ -136,7 +136,7 @@ def link_jacobian(equations: Equations, link: Linked | None = None) -> dict[Entr
 
 
 def link_mass(equations: Equations, link: Linked | None = None) -> dict[Entry, sp.Expr]:
-    """Return what a link adds to M: in the block of its target, and in the block (target, source)."""
+    """Return the terms that a link adds to M, in the blocks (target, target) and (target, source)."""
     edge = _edge(equations, link)
     if edge is None:
         return {}
@@ -158,14 +158,14 @@ def _edge(equations: Equations, link: Linked | None) -> Edge | None:
 
 
 def _weighted(items: Iterable[tuple[Any, sp.Expr]], link: Linked | None) -> dict[Any, sp.Expr]:
-    """Return a table without zeros, the weight of a link as a number."""
+    """Return a table without zero entries, with the weight of the link inserted as a number."""
     weight = {} if link is None else {link[1].weight: sp.Rational(link[0][2].numerator, link[0][2].denominator)}
     table = {key: sp.sympify(e).xreplace(weight) for key, e in items}
     return {key: e for key, e in table.items() if e != 0}
 
 
 def _less(block: Block, push: sp.Matrix, states: tuple[sp.Symbol, ...]) -> Block:
-    """Return a block less the derivatives of M rates by some states."""
+    """Return a block minus the derivatives of `push` (M rates) by some states."""
     return tuple(
         tuple(e - derivative(push[r], s) for e, s in zip(row, states, strict=True)) for r, row in enumerate(block)
     )
@@ -197,7 +197,7 @@ def check_inertia(equations: Equations, language: str) -> None:
 
 
 def node_parameters(equations: Equations, i: int) -> dict[sp.Symbol, int]:
-    """Return the parameters that differ from node to node, with the index in Equations.parameters of those of node `i`."""
+    """Return, for each parameter that differs between nodes, the index of node `i`'s value in Equations.parameters."""
     names = equations.parameters
     symbols = (s for s in equations.node_at(i).parameters if s.name in equations.varied)
     return {s: names.index(f"{s.name}_{i + 1}") for s in symbols}
@@ -207,7 +207,7 @@ def node_parameters(equations: Equations, i: int) -> dict[sp.Symbol, int]:
 
 
 def wrapped(numbers: Iterable[str]) -> list[str]:
-    """Return the numbers of a long table with commas between them, broken into lines."""
+    """Return the numbers of a table, separated by commas and broken into lines."""
     lines, line = [], "    "
     for text in numbers:
         if len(line) + len(text) > LINE:
@@ -218,7 +218,7 @@ def wrapped(numbers: Iterable[str]) -> list[str]:
 
 
 def link_tables(equations: Equations) -> dict[str, list[str]]:
-    """Return the ends of the links and, if links differ in a parameter, the number of that of a link."""
+    """Return the tables of link ends and, if links differ in a parameter, the table of indices of that parameter."""
     tables = {name: [str(link[end]) for link in equations.links] for end, name in enumerate(("TARGET", "SOURCE"))}
     if equations.numbered:
         ((name, layer), *_) = equations.numbered.items()
@@ -228,7 +228,7 @@ def link_tables(equations: Equations) -> dict[str, list[str]]:
 
 
 def array_tables(equations: Equations) -> list[str]:
-    """Return lines that make NumPy arrays of the tables of the links and of their weights; none without links."""
+    """Return lines that make NumPy arrays of the tables of links and weights; an empty list without links."""
     tables = {**link_tables(equations), "WEIGHT": weights(equations)} if equations.links else {}
     return [line for name, table in tables.items() for line in (f"{name} = np.array([", *wrapped(table), "])")]
 

@@ -47,7 +47,7 @@ SOLVE = """static void solve(double *mass, double *right, int columns)
         }
 }
 """
-"""Solves a dense system of DIMENSION equations for several right-hand sides in place."""
+"""C text that solves a dense system of DIMENSION equations in place, for several right-hand sides."""
 
 USE = """
 rhs writes d(state)/dt to rates; state and rates have DIMENSION numbers, numbers has PARAMETERS."""
@@ -61,15 +61,15 @@ columns (from 0).  Entries at one place add up, as in the coordinate format of s
 
 
 def to_c(equations: Equations, values: Mapping[str, float] | None = None) -> str:
-    """Return a C99 source with `rhs` and `jacobian`; up to eight nodes are written out, more are loops.
+    """Return a C99 source with `rhs` and `jacobian`.
 
-    `values` (name -> number) are written as PARAMETERS' defaults.  Raises ValueError for functions that C99 lacks and for
-    unknown or missing values.
+    Networks of up to eight nodes are written out; larger networks become loops.  `values` (name -> number) become the
+    defaults of PARAMETERS.  Raises ValueError for functions that C99 lacks and for unknown or missing values.
     """
     exported = Exported.of(equations, values, "c")
     model, numbers, small = exported.model, exported.numbers, is_unrolled(exported.model)
 
-    # rhs and jacobian end in a solution with M, where it is not the identity
+    # if M is not the identity, rhs and jacobian solve with M at the end
     masses = mass_statements(model) if model.inertial else []
     rhs = rhs_statements(model)
     jacobian = jacobian_statements(model)
@@ -97,7 +97,7 @@ def to_c(equations: Equations, values: Mapping[str, float] | None = None) -> str
 
 
 def _safe(line: str) -> str:
-    """Return text that cannot end the comment around it."""
+    """Return text without the characters that would end the comment around it."""
     return line.replace("\\", "/").replace("*/", "* /").replace("/*", "/ *")
 
 
@@ -118,14 +118,14 @@ def _sizes(model: Equations, small: bool) -> list[str]:
 
 
 def _function(head: str, body: Sequence[Statement]) -> list[str]:
-    """Return the lines of a function; arguments that are not used are named, so that compilers do not warn."""
+    """Return the lines of a C function; mention unused arguments, so that compilers do not warn."""
     arguments = re.findall(r"(\w+)[,)]", head)
     unused = [f"(void){name};" for name in arguments if name not in mentioned(body)]
     return [head, "{", *(f"    {line}" for line in (*unused, *C99.lines(body))), "}"]
 
 
 def _places(model: Equations) -> list[str]:
-    """Return the function that writes the rows and columns of the entries of the Jacobian of many nodes."""
+    """Return the C function that writes the rows and columns of the Jacobian's entries, for many nodes."""
     loops = [("i", "NODES", f"{e.row}*NODES + i", f"{e.column}*NODES + i") for e in node_jacobian(model)]
     for e in link_jacobian(model):
         end = "SOURCE" if e.source else "TARGET"

@@ -1,4 +1,4 @@
-"""The comment at the head of exported text: what the equations are, and the order of states and parameters."""
+"""Write the comment at the head of exported text: the equations, and the order of states and parameters."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .body import check_inertia
 from .portable_names import portable
 
 SHOWN = 12
-"""Of more states only the first and last are listed."""
+"""Largest number of states that are all listed; of more, only the first and the last are listed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """Equations in names of the exported text, the values of its parameters if they are given, and the lines of its head."""
+    """Equations in names of the exported text, values of the parameters (empty if not given), lines of the head."""
 
     model: Equations
     numbers: dict[str, float]
@@ -25,7 +25,7 @@ class Exported:
 
     @classmethod
     def of(cls, equations: Equations, values: Mapping[str, float] | None, language: str) -> Exported:
-        """Rename what needs it; ValueError for values that do not fit, and for masses that a language cannot solve for."""
+        """Rename symbols; raise ValueError for unsuitable values, and for masses that the language cannot handle."""
         checked = _checked(equations, values)
         model, changed = portable(equations)
         check_inertia(model, language)
@@ -54,12 +54,12 @@ def _formulas(equations: Equations) -> list[str]:
 
     try:
         return text(equations).splitlines()
-    except ValueError:  # a function that has no letter; the code below has it
+    except ValueError:  # some function has no short form; the exported code contains the function
         return ["(equations with functions that have no short form: see below)"]
 
 
 def _checked(equations: Equations, values: Mapping[str, float] | None) -> dict[str, float]:
-    """Return the values of all parameters, or none; ValueError where one is unknown, missing or not finite."""
+    """Return the values of all parameters, {} for None; raise ValueError if one is unknown, missing or not finite."""
     if values is None:
         return {}
     for name in values:

@@ -1,7 +1,7 @@
-"""Statements on one scalar after another, as C and Numba have them: node by node, or in loops over nodes and links.
+"""Write scalar statements for C and Numba: node by node, or as loops over nodes and links.
 
-A `Site` is a node or a link as the text sees it: where its states, parameters and rates are.  Parameters come in the array
-`numbers` or, where a language has them as arguments, by their names.
+A `Site` is a node or a link, with the indices of its states, parameters and rates.  Parameters are read from the array
+`numbers`, unless the function takes them as arguments.
 """
 
 from __future__ import annotations
@@ -36,15 +36,16 @@ from .body import (
 )
 
 Index: TypeAlias = Callable[[int], Expression]
-"""Returns the index in the state of a component."""
+"""Returns the index of a component in the state."""
 
 
 @dataclass(frozen=True, slots=True)
 class Site:
     """A node, or a link with its target and its source.
 
-    here, there: the index in the state of a component of the target (or of the node itself) and of the source; loads: where
-    its symbols are; title: of its block, empty for the site that a loop runs over; node, link: those that its templates belong to.
+    here, there: index in the state of a component of the target (or of the node itself), and of the source. loads: the
+    expression from which each symbol is read. title: title of the block; empty for the site of a loop. node, link: the
+    node or link whose templates are used.
     """
 
     here: Index
@@ -62,13 +63,13 @@ class Site:
             return Titled(self.title, tuple(statements))
         if self.there is None:
             return Loop("i_", Number(0), Name("NODES"), tuple(statements))
-        # the ends of the link of a turn, where they are used
+        # load the ends of the link, if the body uses them
         link, names = Name("link_"), mentioned(statements)
         ends = [whole(end, _at(array, link)) for end, array in (("i_", "TARGET"), ("j_", "SOURCE")) if end in names]
         return Loop("link_", Number(0), Name("LINKS"), (*ends, *statements))
 
     def entries(self, array: str) -> Storing:
-        """Store the entries of a matrix: those of a node are new, those of a link are added."""
+        """Return the function that stores matrix entries: it assigns entries of a node and adds entries of a link."""
         kind = Store if self.there is None else Accumulate
 
         def store(entry: Entry, value: Expression) -> Statement:
@@ -79,7 +80,7 @@ class Site:
 
 
 def rhs_statements(equations: Equations, reads: bool = True) -> list[Statement]:
-    """Return statements that write the right-hand side of the network to `rates`; `reads` parameters from `numbers`."""
+    """Return statements that write the right-hand side to `rates`; if `reads`, first read parameters from `numbers`."""
 
     def storing(site: Site) -> Storing:
         kind = Store if site.there is None else Accumulate
@@ -101,7 +102,7 @@ def jacobian_statements(equations: Equations, reads: bool = True) -> list[Statem
         of_node, of_link = list(node_jacobian(equations)), list(link_jacobian(equations))
         if site.there is None:
             return lambda entry, value: Store("values", element_of(of_node.index(entry), "NODES", "i_"), value)
-        # the values of all links are behind those of all nodes
+        # `values` holds the entries of all nodes first, then the entries of all links
         begin = [len(of_node) * Name("NODES")] if of_node else []
         slots = {entry: plus(*begin, element_of(k, "LINKS", "link_")) for k, entry in enumerate(of_link)}
         return lambda entry, value: Store("values", slots[entry], value)
@@ -130,7 +131,7 @@ def _at(array: str, index: Expression) -> Load:
 
 
 def _nodes(equations: Equations, reads: bool) -> Iterator[Site]:
-    """Yield the nodes, or the one site that a loop over them has."""
+    """Yield one site for each node, or a single site for the loop over nodes."""
     names = equations.parameters
     for i in range(equations.n) if is_unrolled(equations) else (None,):
         node, k = equations.node_at(i or 0), i or 0
@@ -144,13 +145,13 @@ def _nodes(equations: Equations, reads: bool) -> Iterator[Site]:
 
 
 def _links(equations: Equations, reads: bool) -> Iterator[Site]:
-    """Yield the links, or the one site that a loop over them has."""
+    """Yield one site for each link, or a single site for the loop over links."""
     names = equations.parameters
     if is_unrolled(equations):
         for link, edge in equations.linked():
             target, source, _ = link
             here, there = (_literal(equations.places[end]) for end in (target, source))
-            # parameters that differ: those of the target, those of the source, those of the link
+            # parameters that differ between nodes or links: of the target, of the source, of the link
             slots = node_parameters(equations, target)
             slots |= {s: names.index(f"{of.name}_{source + 1}") for s, of in edge.theirs}
             numbered = (s for s in edge.parameters if s.name in equations.numbered)
@@ -173,7 +174,7 @@ def _links(equations: Equations, reads: bool) -> Iterator[Site]:
 def _loads_of(
     edge: Edge, here: Index, there: Index, parameters: dict[sp.Symbol, Expression]
 ) -> dict[sp.Symbol, Expression]:
-    """Return where the states at both ends of a link are, its parameters, and the rates at both ends."""
+    """Return the expressions from which to read states and rates at both ends of a link, and its parameters."""
     slots = [*map(here, range(len(edge.here))), *map(there, range(len(edge.there)))]
     states = {s: _at("state", slot) for s, slot in zip((*edge.here, *edge.there), slots, strict=True)}
     rates = {s: _at("rates", slot) for s, slot in zip(link_rate_symbols(edge), slots, strict=True)}
@@ -193,7 +194,7 @@ def _parameters(
     of_node: Callable[[Equations, int], Mapping[Any, sp.Expr]],
     of_link: Callable[[Equations, Linked], Mapping[Any, sp.Expr]],
 ) -> list[Statement]:
-    """Return statements that read the used parameters of the whole network from `numbers`."""
+    """Return statements that read the parameters of the whole network that are used from `numbers`."""
     nodes = {kind: i for i, kind in enumerate(equations.kind_of)}.values()
     links = {edge: (link, edge) for link, edge in equations.linked()}.values()
     tables = [table(equations, i) for table in (of_node, node_mass) for i in nodes]

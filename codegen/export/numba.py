@@ -1,4 +1,4 @@
-"""The right-hand side as Python text that Numba compiles to a C function with the signature of NumbaLSODA."""
+"""Export the right-hand side as Python text; Numba compiles it to a C function with the signature of NumbaLSODA."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from .loops import mass_statements, rhs_statements
 def to_numba(equations: Equations, values: Mapping[str, float] | None = None) -> str:
     """Return a module whose `rhs` is a Numba cfunc of (t, state, rates, numbers), the signature lsoda_sig of NumbaLSODA.
 
-    Up to eight nodes are written out, more are loops; `values` (name -> number) become the array PARAMETERS.  Raises
-    ValueError for functions that Python's math lacks and for unknown or missing values.
+    Networks of up to eight nodes are written out; larger networks become loops.  `values` (name -> number) become the
+    array PARAMETERS.  Raises ValueError for functions that Python's math lacks and for unknown or missing values.
     """
     exported = Exported.of(equations, values, "numba")
     model = exported.model
@@ -35,7 +35,7 @@ def to_numba(equations: Equations, values: Mapping[str, float] | None = None) ->
     lines += ["@cfunc(lsoda_sig)", "def rhs(t, state, rates, numbers):"]
     body = rhs_statements(model)
     if model.inertial:
-        # the rates are M^-1 times the right-hand side; NumPy solves arrays, `rates` is a pointer
+        # the rates are M^-1 times the right-hand side; `rates` is a pointer, so copy its values to an array for NumPy
         k = Name("k_")
         body += [*mass_statements(model), Array("right_", Name("DIMENSION"))]
         body += [Loop("k_", Number(0), Name("DIMENSION"), (store("right_", k, Load("rates", k, None)),))]

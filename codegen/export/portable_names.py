@@ -29,22 +29,22 @@ _OWN = """np math types cfunc carray csc_matrix lsoda_sig address rhs jac jacobi
 numbers matrix mass_ solve right_ values sign i_ j_ k_ link_ weight_ NODES DIMENSION PARAMETERS LINKS ENTRIES TARGET SOURCE
 WEIGHT NUMBER ROWS COLUMNS STATE NODE HEAVY defaults memset"""
 RESERVED = {*f"{_C} {_MATH} {_OWN}".split(), *keyword.kwlist, *keyword.softkwlist, *dir(builtins)}
-"""Words of the languages, of their mathematics and of the exported text; a symbol of that name gets an underscore."""
+"""Names used by the languages, their mathematical libraries or the exported text; a symbol of this name is renamed."""
 
 _MACRO = re.compile(r"(M|FP|MATH)_\w+")
-"""Macros of the mathematical libraries of C."""
+"""Matches macros of C's mathematical library."""
 
 _LATER = re.compile(r"w[0-9]+|rate_[ij][0-9]+|mass_[0-9]+_")
-"""Names of the exported text with a number."""
+"""Matches numbered names of the exported text."""
 
 
 def portable(equations: Equations) -> tuple[Equations, dict[str, str]]:
-    """Return the same equations in names that every exported language accepts, and the names that changed."""
+    """Return the equations with names that every exported language accepts, and the map of changed names."""
     symbols = dict.fromkeys(s for node in equations.nodes for s in (*node.state, *node.parameters))
     taken = {s.name for s in symbols if _accepted(s.name)} | {"t"}
     of_nodes = {s: _renamed(s, taken) for s in symbols}
     changed = {s.name: new.name for s, new in of_nodes.items() if s.name != new.name}
-    # links: parameters that nodes or other links share keep their names, states and weight get free ones
+    # links: parameters shared with nodes or other links keep their names; states and weight get free names
     shared = dict(of_nodes)
     edges: dict[Edge, Edge] = {}
     for edge in equations.edges:
@@ -78,10 +78,10 @@ def _accepted(name: str) -> bool:
 
 
 def _renamed(s: sp.Symbol, taken: set[str], occupied: bool = False) -> sp.Symbol:
-    """Return the symbol itself where its name is accepted and free, else one of a similar name."""
+    """Return the symbol if its name is accepted and free, else a symbol with a similar name."""
     if _accepted(s.name) and not occupied:
         return real(s.name)
-    # letters, digits and single underscores, a letter first; then a number until the name is free
+    # allow letters, digits and single underscores, with a letter first; then append numbers until the name is free
     name = re.sub("_+", "_", "".join(map(_ascii, unicodedata.normalize("NFKC", s.name)))).strip("_") or "symbol"
     name = name if name[0].isalpha() else f"s_{name}"
     base, number = name if _accepted(name) else f"{name}_", 2
@@ -93,7 +93,7 @@ def _renamed(s: sp.Symbol, taken: set[str], occupied: bool = False) -> sp.Symbol
 
 
 def _ascii(letter: str) -> str:
-    """Return a letter of C: Greek letters by their names, an underscore for all others."""
+    """Return a character that C allows: the name of a Greek letter, an underscore for any other character."""
     if letter.isascii():
         return letter if letter.isalnum() else "_"
     parts = unicodedata.name(letter, "").split()

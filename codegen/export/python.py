@@ -1,4 +1,4 @@
-"""The equations as a Python module for scipy.integrate.solve_ivp that needs NumPy and SciPy only."""
+"""Export the equations as a Python module for scipy.integrate.solve_ivp; the module needs only NumPy and SciPy."""
 
 from __future__ import annotations
 
@@ -36,9 +36,10 @@ def sparsity():
 def to_python(equations: Equations, values: Mapping[str, float] | None = None) -> str:
     """Return a module with rhs(t, state, …), jac(t, state, …) and sparsity() for scipy.integrate.solve_ivp.
 
-    The parameters follow the state, in the order of Equations.parameters; `values` (name -> number) become their defaults.
-    Up to eight nodes are written out and jac is dense; more are array operations and jac is a sparse matrix.  Raises
-    ValueError for functions that NumPy lacks and for unknown or missing values.
+    The parameters follow the state, in the order of Equations.parameters; `values` (name -> number) become their
+    defaults.  Networks of up to eight nodes are written out, and jac returns a dense matrix.  Larger networks become
+    array operations, and jac returns a sparse matrix.  Raises ValueError for functions that NumPy lacks and for unknown
+    or missing values.
     """
     exported = Exported.of(equations, values, "python")
     model, numbers, small = exported.model, exported.numbers, is_unrolled(exported.model)
@@ -48,12 +49,12 @@ def to_python(equations: Equations, values: Mapping[str, float] | None = None) -
     rhs: list[Statement] = [let("rates", call("np.empty_like", "state"))]
     rhs += rhs_statements(model, reads=False) if small else rhs_arrays(model)
     if small:
-        # masses that move make the Jacobian a function of the rates
+        # if M depends on the state, the Jacobian depends on the rates
         jac: list[Statement] = [] if model.constant_mass else [let("rates", call("rhs", "t", "state", *defaults))]
         jac += [let("matrix", call("np.zeros", "(DIMENSION, DIMENSION)")), *jacobian_statements(model, reads=False)]
     else:
         jac = [Array("values", Name("ROWS.size")), *jacobian_arrays(model)]
-    # the Jacobian of many nodes is a sparse matrix; both functions solve with M where it is not the identity
+    # the Jacobian of many nodes is a sparse matrix; if M is not the identity, rhs and jac solve with M
     sparse = call("csc_matrix", "(values, (ROWS, COLUMNS))", "shape=(DIMENSION, DIMENSION)")
     if model.inertial:
         masses = mass_statements(model, reads=False) if small else mass_arrays(model)
@@ -88,9 +89,9 @@ def to_python(equations: Equations, values: Mapping[str, float] | None = None) -
 
 
 def _defaults(model: Equations, numbers: Mapping[str, float]) -> dict[str, str]:
-    """Return the parameters that a function takes, with their values or "".
+    """Return the parameters that a function takes, each with its value, "" without values.
 
-    In a large network, parameters that differ between nodes or links come as one sequence.
+    In a large network, a parameter that differs between nodes or links is one sequence.
     """
     if is_unrolled(model):
         return {name: repr(numbers[name]) if numbers else "" for name in model.parameters}
@@ -111,9 +112,10 @@ def _function(name: str, arguments: str, docstring: str, body: list[Statement]) 
 
 
 def _dense_places(model: Equations) -> list[str]:
-    """Return lines with the rows and columns where jac can differ from zero.
+    """Return lines with the rows and columns of the entries of jac that can differ from zero.
 
-    A rate that is solved for depends on all that its row couples: whole rows differ from zero.
+    In the rows that M couples, all entries count: solving with M makes each of these rates depend on all of their
+    terms.
     """
     heavy = {row for (row, column), e in model.mass().items() if e != sp.Integer(row == column)}
     places = sorted(set(model.jacobian()) | {(row, column) for row in heavy for column in range(model.dimension)})

@@ -1,4 +1,7 @@
-"""A Numba compiler of two passes: read the syntax tree, emit LLVM; `decorator` goes on without it if it raises."""
+"""A Numba compiler with two passes: read the syntax tree, emit LLVM.
+
+If this compiler raises, `decorator` falls back on Numba's own pipeline.
+"""
 
 from __future__ import annotations
 

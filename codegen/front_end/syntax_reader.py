@@ -56,7 +56,7 @@ OPERATORS: dict[type, Callable[..., Any]] = {
 
 
 class UnreadError(errors.NumbaError):
-    """Raised for syntax outside the subset, and for types that it is not read for."""
+    """Raised for syntax outside the subset, and for operand types that the subset does not support."""
 
     def __init__(self, syntax: str = "") -> None:
         super().__init__(syntax)

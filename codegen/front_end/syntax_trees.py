@@ -1,4 +1,4 @@
-"""Parse modules of kernels; their syntax trees stay in the module, where the front end looks them up."""
+"""Parse modules of kernels; a global variable of each module holds the syntax trees for the front end."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import ast
 from typing import Any
 
 TREES = "__syntax__"
-"""Global variable of a module with the syntax trees of its functions, by first line (as `code.co_firstlineno` has it)."""
+"""Name of the global variable with the syntax trees of a module's functions, by first line (`code.co_firstlineno`)."""
 
 
 def functions(tree: ast.Module) -> dict[int, ast.FunctionDef]:

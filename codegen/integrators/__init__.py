@@ -29,7 +29,7 @@ NEEDED = ("KIND", "ORDER", "ERROR_ORDER", "DENSE_ORDER", "SOURCE", "A", "B", "C"
 
 
 class IntegratorKind(StrEnum):
-    """What KIND says in the file of an integrator."""
+    """The values of KIND in the file of an integrator."""
 
     ROSENBROCK = "rosenbrock"
     EXPLICIT = "explicit"
@@ -60,7 +60,7 @@ class Integrator:
         Largest error of the dense output in a component of infinite stiffness, in units of its last
         row; 0 if its order is the same there.
     gamma, d, big_c
-        What a Rosenbrock method has besides: gamma, the weights of df/dt, and the matrix C.
+        Further coefficients of a Rosenbrock method: gamma, the weights of df/dt, and the matrix C.
     inexact
         True for a W-method, whose order does not need the exact Jacobian: its matrix has one block
         for each oscillator.
@@ -130,12 +130,12 @@ class Integrator:
 
     @property
     def dense_rows(self) -> int:
-        """Coefficients of the dense output for each state variable."""
+        """Number of coefficients of the dense output for each state variable."""
         return self.order if self.series else len(self.dense)
 
     @property
     def stages(self) -> int:
-        """Stages of the step itself, without those that serve the dense output alone."""
+        """Number of stages of the step, without the extra stages that only the dense output needs."""
         return len(self.b)
 
 
@@ -176,7 +176,7 @@ def integrator(name: str, order: int | None = None) -> Integrator:
     name
         One of `names()`.
     order
-        The order of a Taylor method; the others have one.
+        The order of a Taylor method; the order of any other method is fixed.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Cash-Karp: explicit Runge-Kutta method of order 5(4) with 6 stages, the one the source paper integrates with.
 
-Its dense output is the cubic Hermite polynomial, which needs one more stage: the slope at the new point.
+The dense output is the cubic Hermite polynomial, which needs one more stage: the slope at the new point.
 """
 
 from fractions import Fraction as _F

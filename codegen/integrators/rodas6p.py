@@ -1,6 +1,6 @@
 """Rodas6P: Rosenbrock method of order 6(5) with 16 stages, stiffly accurate, L-stable; needs the exact Jacobian.
 
-Its own dense output takes three more stages; this one is the chord between the ends of the step.
+The published dense output needs three more stages.  Here the dense output is the chord between the ends of the step.
 """
 
 KIND = "rosenbrock"

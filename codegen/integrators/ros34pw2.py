@@ -1,6 +1,7 @@
-"""ROS34PW2: Rosenbrock-W method of order 3(2) with 4 stages, whose order does not hang on the Jacobian.
+"""ROS34PW2: Rosenbrock-W method of order 3(2) with 4 stages, whose order does not depend on the Jacobian.
 
-Its matrix leaves out what one oscillator does to another: each is solved by itself.  Dense output is the chord.
+The matrix of the linear equations omits the derivatives between different oscillators, so that each oscillator is
+solved separately.  The dense output is the chord between the ends of the step.
 """
 
 KIND = "rosenbrock"

@@ -2,5 +2,5 @@
 
 KIND = "taylor"
 ORDER = 16
-"""The order at moderate tolerances; a kernel takes the one that its tolerance asks for."""
+"""The order at moderate tolerances; a kernel uses the order for its own tolerance (codegen/taylor/series_order.py)."""
 SOURCE = "Jorba & Zou, Experimental Mathematics 14, 99 (2005)"

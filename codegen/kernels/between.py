@@ -1,6 +1,7 @@
 """Find fast changes of an observed value between two sample points.
 
-A value jumps or has a kink where a gap passes zero, and changes quickly where the depth of an exponential does.
+A value jumps or has a kink where a gap passes zero.  A value changes quickly where the depth of an exponential passes
+zero.
 """
 
 from __future__ import annotations

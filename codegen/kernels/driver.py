@@ -1,4 +1,4 @@
-"""The texts of drivers and recorders. They depend on the width and on the kind of step, and not on the scene."""
+"""Join the texts of drivers and recorders, which depend on the width and the kind of step, but not on the scene."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ RECORDERS = {
 
 @dataclass(frozen=True, slots=True)
 class Recorder:
-    """All that the text of a recorder depends on; equal recorders share their machine code."""
+    """The values that determine the text of a recorder; equal recorders share machine code."""
 
     entry: str  # name of the function
     width: int
@@ -50,7 +50,7 @@ class Recorder:
 
 @dataclass(frozen=True, slots=True)
 class Driver:
-    """All that the text of a driver depends on; scenes with equal drivers share their machine code."""
+    """The values that determine the text of a driver; scenes with equal drivers share machine code."""
 
     kind: KernelKind
     width: int  # cells, or modes, in a register

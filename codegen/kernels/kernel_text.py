@@ -1,4 +1,4 @@
-"""The text of a kernel: the values and functions that kernels of sweeps and of modes share."""
+"""Write the parts of a kernel's text that kernels of sweeps and kernels of modes share."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class KernelSource(ABC):
 
     @property
     def digest(self) -> str:
-        """Hexadecimal SHA-256 of the text and of those of its driver and recorders."""
+        """Hexadecimal SHA-256 of the texts of the module, its driver and its recorders."""
         return _digest(self.text, *(module.text for module in self.shared))
 
 

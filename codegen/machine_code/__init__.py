@@ -1,1 +1,4 @@
-"""Compile kernels to machine code, keep it on disk, load it: `compile.load` is the entry; no step and no scene."""
+"""Compile kernels to machine code, store the code on disk and load it; the entry is `compile.load`.
+
+This package imports nothing about steps or scenes.
+"""

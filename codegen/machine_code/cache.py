@@ -1,10 +1,11 @@
-"""The folder of compiled kernels and drivers, from which code is loaded: a folder that others can change is refused.
+"""Manage the folder of compiled kernels and drivers; refuse a folder that other users can change.
 
-The folder is opened once and its files are reached through its descriptor, so that nobody can replace it between a
-check and a reading.  The machine code of a module is one file, a pickle, which may run anything when it is loaded.
-Hence it begins with a signature (HMAC) by a key of the user, which lies outside of the folder: code of another user or
-machine is refused, and damaged code too.  The file is read once: the bytes that were checked are the bytes that are
-loaded.  A file that is refused is compiled and written again.  Reading needs no right to write.
+The folder is opened once, and files are opened relative to the folder's descriptor, so that nobody can replace the
+folder between a check and a read.  The machine code of a module is one pickle file, and loading a pickle can run any
+code. Each file therefore begins with a signature (HMAC) made with the user's key, which is stored outside of the
+folder. Damaged code, and code of another user or machine, is refused.  Each file is read once, so that exactly the
+checked bytes are loaded.  If a file is refused, its module is compiled and written again.  Reading needs no write
+permission.
 """
 
 from __future__ import annotations
@@ -35,13 +36,13 @@ DIGEST = hashlib.sha256().digest_size
 """Bytes of a signature and of the key."""
 
 KINDS = ("kernel", "driver")
-"""Beginnings of the file names: the functions of a scene, and drivers and recorders, which scenes share."""
+"""Prefixes of file names: "kernel" for functions of a scene, "driver" for drivers and recorders, which scenes share."""
 
 KEY = "cache.key"
-"""The file of the key that signs machine code."""
+"""Name of the file with the key that signs machine code."""
 
 LOCK_TIMEOUT = 120.0
-"""Seconds that a process waits for another one to compile the same module; compilation takes some 10 s at most."""
+"""Seconds for which a process waits while another process compiles the same module; compilation takes up to 10 s."""
 
 
 def cache_folder() -> Path:
@@ -56,7 +57,7 @@ def cache_folder() -> Path:
 
 
 def _user_folder(variable: str, linux: str, mac: str) -> Path:
-    """Return the folder of this package in the user's folder of caches or settings, as each system names it."""
+    """Return this package's folder in the user's folder of caches or settings, whose name depends on the system."""
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
     elif sys.platform == "darwin":
@@ -71,7 +72,7 @@ class Folder:
     """An open cache folder (`open_folder`)."""
 
     path: Path
-    descriptor: int | None  # None on Windows, which has none of folders: files are reached by their paths there
+    descriptor: int | None  # None on Windows, where folders have no descriptors: files are opened by path
 
     def read(self, name: str) -> bytes | None:
         """Return the content of a file, None if there is no such file."""
@@ -84,7 +85,7 @@ class Folder:
             return file.readall()
 
     def read_trusted(self, name: str) -> bytes | None:
-        """Return the content of a file; None if there is none, or, with a warning, if it is refused."""
+        """Return the content of a file; None if there is no file, or (with a warning) if the file is refused."""
         try:
             return self.read(name)
         except OSError as problem:
@@ -92,7 +93,7 @@ class Folder:
             return None
 
     def write(self, name: str, data: bytes) -> None:
-        """Write a file, for its owner alone, that appears complete or not at all."""
+        """Write a file that only the owner can read; the file appears complete or not at all."""
         temporary = f"{name}-{secrets.token_hex(8)}.tmp"
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
         descriptor = os.open(self._at(temporary), flags, 0o600, dir_fd=self.descriptor)
@@ -117,7 +118,7 @@ class Folder:
     # -- machine code and its signature -----------------------------------------------------------------------
 
     def load_code(self, name: str) -> bytes | None:
-        """Return the machine code of the module `name`; None if there is none, or, with a warning, if it is refused."""
+        """Return the machine code of module `name`; None if there is none, or (with a warning) if it is refused."""
         data = self.read_trusted(f"{name}.code")
         if data is None:
             return None
@@ -135,7 +136,7 @@ class Folder:
         return hmac.digest(self.key(), f"{name}\n".encode() + code, "sha256")
 
     def key(self) -> bytes:
-        """Return the user's key, from the folder of settings, or from this folder if that one cannot be used."""
+        """Return the user's key from the folder of settings; from this folder if the folder of settings is unusable."""
         try:
             with open_folder(_user_folder("XDG_CONFIG_HOME", ".config", "Application Support")) as settings:
                 return settings.key_here()
@@ -213,11 +214,11 @@ def open_folder(path: Path) -> Iterator[Folder]:
 
 
 _warned_folders: set[Path] = set()
-"""The folders with files that were refused."""
+"""The folders for which a warning of refused files was issued."""
 
 
 def _warn_of_refusal(folder: Path, problem: str) -> None:
-    """Warn, once for each folder, of a file that is not loaded."""
+    """Warn of a refused file, once for each folder."""
     if folder not in _warned_folders:
         _warned_folders.add(folder)
         warn(f"kernel cache {folder}: refused a file, whose kernel is compiled anew, as others may be: {problem}")
@@ -237,7 +238,7 @@ def _check_parents(real: Path) -> None:
     """Raise PermissionError if another user can replace a folder, given by its path without symbolic links."""
     for parent in real.parents:
         status = parent.stat()
-        # The owner of a parent can, and so can all who may write to it, unless it is sticky (/tmp).
+        # A parent's owner can replace `real`; so can users with write permission, unless it is sticky (/tmp).
         if status.st_uid not in (os.getuid(), 0):
             raise PermissionError(
                 f"kernel cache {real} lies in {parent}, which belongs to another user; "

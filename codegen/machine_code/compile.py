@@ -1,8 +1,8 @@
-"""From the text of a kernel to machine code, through a cache on disk that is named by content.
+"""Compile the text of a kernel to machine code, with a cache on disk whose files are named by content.
 
-The functions of a scene are one module; the driver that runs them and the recorders are others, which scenes share.
-Scenes with the same code share the first module too: steps in loops are alike for all graphs of a size.  A module
-passes these stages, each once per process and the compilation once per cache folder:
+The functions of a scene form one module.  The driver and the recorders are further modules, which scenes share.  Scenes
+whose functions have the same text also share the first module: looped steps have one text for all graphs of a size.
+A module passes these stages once per process (compilation once per cache folder):
 
 1. `_fingerprint` hashes everything that machine code depends on (text, sources of lanes and front end, versions, flags of Numba,
    processor) to the name of the module.
@@ -55,7 +55,7 @@ LOG = logging.getLogger(__name__)
 """Reports at the level INFO each compilation, which takes seconds."""
 
 _lock = threading.RLock()
-"""Held while a kernel is loaded or compiled.  A fork waits for it, so that no child begins amid a compilation."""
+"""Held while a kernel is loaded or compiled.  A fork waits for the lock: no child starts during a compilation."""
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_lock.release)
 
@@ -74,14 +74,14 @@ class Compiled:
     """The compiled functions of one module."""
 
     functions: dict[str, Any]  # by name
-    path: str  # the file that holds the text; one of a folder `<memory>` if it is not on disk
+    path: str  # file with the text; a name in the folder `<memory>` if the text is not on disk
     from_cache: bool  # True if the machine code was loaded from the cache, False if it was compiled
-    problem: str = ""  # why the machine code is not kept on disk; empty if it is
+    problem: str = ""  # reason why the machine code is not stored on disk; empty if it is stored
 
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """The compiled functions of a scene and the driver that runs them: `print(kernel.source)` shows them as text."""
+    """The compiled functions of a scene, and the driver that runs them; `print(kernel.source)` shows the functions."""
 
     origin: KernelSource
     compiled: Compiled = field(repr=False)
@@ -114,7 +114,7 @@ class Kernel:
 
     @property
     def source(self) -> str:
-        """The text of the functions of the scene; `kernel.origin.driver.text` is that of the driver."""
+        """The text of the functions of the scene; `kernel.origin.driver.text` is the text of the driver."""
         return self.origin.text
 
     @property
@@ -156,9 +156,9 @@ def load_shared(part: Driver | Recorder) -> Compiled:
 
 
 def forget() -> None:
-    """Forget the kernels and drivers of this process: the next `load` takes them from the cache folder.
+    """Forget the kernels and drivers of this process; the next `load` reads the cache folder.
 
-    Those that are not in use are freed.
+    Kernels and drivers that are not in use are freed.
     """
     with _lock:
         _load.cache_clear()
@@ -190,7 +190,7 @@ _warn_once = functools.cache(warn)
 
 
 def _warn_of_slowness() -> None:
-    """Warn, once per process, of what makes compilation or kernels slow."""
+    """Warn, once per process, of settings that slow down compilation or kernels."""
     if decorator.front_end_problems:
         _warn_once(
             "kernels: found a fault of the front end; expected none; Numba's own pipeline compiles with the same results "
@@ -264,7 +264,7 @@ def _from_folder(text: str, name: str, wanted: dict[str, Any], description: str,
 
 
 def _stored(text: str, name: str, wanted: dict[str, Any], folder: Folder, path: Path) -> Compiled | None:
-    """Load the functions from the machine code in the folder; None if there is none, or none that can be loaded."""
+    """Load the functions from machine code in the folder; return None if there is none, or if it cannot be loaded."""
     stored = folder.load_code(name)
     if stored is None:
         return None
@@ -276,7 +276,7 @@ def _stored(text: str, name: str, wanted: dict[str, Any], folder: Folder, path: 
 
 @dataclass(frozen=True, slots=True)
 class _FunctionCache:
-    """The cache of one function, as Numba's dispatcher expects it, in the machine code of its module.
+    """The cache of one function, with the interface that Numba's dispatcher expects, in the code of its module.
 
     Numba's own cache reads and writes files by their paths, unsigned.
     """
@@ -327,7 +327,7 @@ SOURCES = [
     Path(records.__file__),
     Path(function_table.__file__),
 ]
-"""The files whose code is a part of machine code, besides the text of the module."""
+"""The source files whose code becomes a part of machine code, besides the text of the module."""
 
 FLAGS = (
     "BOUNDSCHECK", "DEBUG_JIT", "DEBUG_NRT", "DEBUG_NRT_STACK_LIMIT", "DEBUGINFO_DEFAULT", "DISABLE_INTEL_SVML",

@@ -1,7 +1,7 @@
-"""The functions that a driver takes, as one argument: a table of the addresses of their machine code.
+"""Pass functions to a driver as one argument: a table with the addresses of their machine code.
 
-Numba takes first-class functions one by one and looks up the types and addresses of each at every call, which takes
-longer than a short run.  Here this happens once, when the table is made.
+Numba passes first-class functions one by one, and looks up types and addresses of each function at every call, which
+takes longer than a short run.  Here the look-up happens once, when the table is created.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class FunctionsType(types.Type):
 
 
 class Functions:
-    """Compiled functions, None in the place of those that are not called."""
+    """Compiled functions; None stands for a function that is not called."""
 
     def __init__(self, functions_type: FunctionsType, functions: Sequence[Any]) -> None:
         self._numba_type_ = functions_type  # `typeof` of Numba looks here

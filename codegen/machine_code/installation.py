@@ -1,7 +1,7 @@
-"""The error for a fault of the installation, as opposed to one of a scene."""
+"""Define the error for a fault of the installation, as opposed to a fault in a scene."""
 
 from __future__ import annotations
 
 
 class InstallationError(RuntimeError):
-    """Raised if a kernel cannot be made here: versions differ, the kernel differs, or Numba does not compile."""
+    """Raised if this installation cannot make a kernel: versions or kernels differ, or Numba fails to compile."""

@@ -1,4 +1,4 @@
-"""The processor that machine code is compiled for; another one may round the last digit of a result differently."""
+"""Describe the processor for which machine code is compiled; another processor may round the last digit differently."""
 
 from __future__ import annotations
 

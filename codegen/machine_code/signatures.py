@@ -1,7 +1,7 @@
-"""Numba types of the functions that drivers, recorders and scenes consist of.
+"""Define the Numba types of the functions in drivers, recorders and scenes.
 
-All functions of a kernel are compiled for these types alone.  In the comments, `lane` has one entry for each cell of a
-register, and an address points to groups of as many doubles (codegen/simd/addresses.py).
+Each function of a kernel is compiled only for these types.  In the comments, `lane` holds one entry for each cell of a
+register, and an address points to groups of doubles, one double for each cell (codegen/simd/addresses.py).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ NUMBER, INTEGER = types.float64, types.int64
 VECTOR, MATRIX, CUBE = NUMBER[::1], NUMBER[:, ::1], NUMBER[:, :, ::1]
 CELLS, COUNTS = INTEGER[::1], INTEGER[:, ::1]
 READ_ONLY = types.Array(NUMBER, 2, "C", readonly=True)
-"""A matrix that a kernel only reads; the caller's may be writable or not."""
+"""Type of a matrix that a kernel only reads; callers may pass writable or read-only arrays."""
 NETWORK = (types.UniTuple(CELLS, len(NAMES)), VECTOR)
 """Links and elimination program of a step in loops (codegen/steps/safe_names.py), and the weights of its links."""
 ROWS = types.Tuple((READ_ONLY, READ_ONLY, READ_ONLY, VECTOR))

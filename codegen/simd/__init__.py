@@ -1,6 +1,6 @@
-"""What generated kernels import: lanes of a SIMD register, elementary functions on them, the decorator `njit`.
+"""Export all names that generated kernels import: SIMD lanes, elementary functions on lanes, the decorator `njit`.
 
-Kernels name this package alone, so that no text of a kernel changes if a function moves behind it.
+Kernels import from this package only, so that moving a function between its modules changes no text of a kernel.
 """
 
 from __future__ import annotations

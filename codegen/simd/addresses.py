@@ -1,6 +1,7 @@
-"""Memory by its address: one machine word, without the shape and the reference count of an array.
+"""Refer to memory by an address: one machine word, without the shape and reference count of an array.
 
-The array that an address points into must outlive it: a kernel holds all of its memory in one array to its end.
+An address is valid while the array that it points into exists.  A kernel holds all of its memory in one array until the
+kernel returns.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from numba.extending import intrinsic, lower_builtin, models, register_model
 from .lane_types import DOUBLE
 
 FIRST = {"target": "cpu"}
-"""Metadata of operators: Numba tries those for the CPU before its own ones, which are for any target.
+"""Metadata of operators: Numba tries operators with the target "cpu" before its own operators for any target.
 
-Otherwise Numba would try some dozen operators of arrays, texts and dates first for each sum of two lanes.
+Without this entry, Numba would first try a dozen operators of arrays, strings and dates for each sum of two lanes.
 """
 
 
@@ -39,7 +40,7 @@ class _AddressModel(models.PrimitiveModel):
 
 
 def data_of(context: Any, builder: ir.IRBuilder, value: ir.Value, fe_type: types.Type) -> ir.Value:
-    """Return the pointer to the first double of an array; of an address, itself."""
+    """Return the pointer to the first double of an array; return an address unchanged."""
     return value if isinstance(fe_type, Address) else context.make_array(fe_type)(context, builder, value).data
 
 

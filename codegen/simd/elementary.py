@@ -1,18 +1,19 @@
 """Branch-free elementary functions of lanes, one polynomial for the whole reduced range.
 
 Reductions follow the classical scheme (Cody & Waite, *Software Manual for the Elementary Functions*, 1980; the
-logarithm's final sum as in Tang, ACM Trans. Math. Softw. 16, 378, 1990).  A product whose rounding would count is
-taken by `fma`, others by `multiply_add`, which rounds twice on old processors.  Polynomials are summed by halves of
-halves (Estrin, Proc. Western Joint Computer Conf. 17, 33, 1960), so that few operations wait for each other.
+logarithm's final sum as in Tang, ACM Trans. Math. Softw. 16, 378, 1990).  `fma` is used if the rounding error of the
+product matters, otherwise `multiply_add`, which rounds twice on old processors.  Polynomials are evaluated by Estrin's
+scheme (Proc. Western Joint Computer Conf. 17, 33, 1960), in which few operations depend on each other.
 
-The polynomials are our own Remez fits, weighted by the relative error of the result.  `ATAN`, `SINE` and `EXP` are
-fitted in 40-digit arithmetic on 120 Chebyshev points; in the first two each of the three lowest coefficients is
-rounded to double precision before the higher ones are fitted anew.  Beside each stands its error with the rounded
-coefficients; tests/codegen/simd/test_elementary_fits.py makes all three again.
+The polynomials are Remez fits made for this file, weighted by the relative error of the result.  `ATAN`, `SINE` and
+`EXP` are fitted in 40-digit arithmetic on 120 Chebyshev points.  In `ATAN` and `SINE`, each of the three lowest
+coefficients is rounded to double precision, and then the higher coefficients are fitted again.  The text below each
+polynomial gives the error with rounded coefficients; tests/codegen/simd/test_elementary_fits.py repeats these three
+fits.
 
-The circular functions subtract three parts of pi: their error is below 1.5 units in the last place up to |x| = 1e9,
-below 2e-15 up to 1e15, and beyond, where neighbouring doubles lie further apart than a radian matters, they stay
-within [-1, 1].
+Sine and cosine subtract a multiple of pi, which is split into three doubles.  Their error is below 1.5 units in the
+last place up to |x| = 1e9, and below 2e-15 up to |x| = 1e15.  For larger |x|, the distance between neighbouring doubles
+is not small compared with a period; the results have no accuracy, but lie within [-1, 1].
 """
 
 from __future__ import annotations

@@ -40,12 +40,12 @@ class Mask(types.Type):
 
 
 def vector(element: ir.Type, width: int) -> ir.Type:
-    """Return the LLVM vector of `width` elements; a single one is a scalar (LLVM 20 aborts on some vectors of one bit)."""
+    """Return the LLVM vector of `width` elements, a scalar for width 1 (LLVM 20 aborts on some vectors of one bit)."""
     return element if width == 1 else ir.VectorType(element, width)
 
 
 def constant_like(value: ir.Value, number: float) -> ir.Constant:
-    """Return the constant with the same number in every lane of the type of a value."""
+    """Return a constant of the type of `value`, with the same number in every lane."""
     kind = value.type
     return ir.Constant(kind, [number] * kind.count if isinstance(kind, ir.VectorType) else number)
 
@@ -63,9 +63,10 @@ class _MaskModel(models.PrimitiveModel):
 
 
 def native_width(registers: int = 1) -> int:
-    """Return the lane width for this CPU: 8 with AVX-512, 4 with AVX, else 2 a register; SYNCHAIN_WIDTH overrides it.
+    """Return the lane width for `registers` registers of this CPU; SYNCHAIN_WIDTH overrides the width.
 
-    Raises ValueError where SYNCHAIN_WIDTH is not one of 1, 2, 4, 8, 16.
+    A register holds 8 doubles with AVX-512, 4 with AVX, else 2.  Raises ValueError if SYNCHAIN_WIDTH is not one of 1,
+    2, 4, 8, 16.
     """
     wish = os.environ.get("SYNCHAIN_WIDTH", "")
     if wish:
@@ -78,9 +79,9 @@ def native_width(registers: int = 1) -> int:
 
 
 def has_fma() -> bool:
-    """Return True if kernels are compiled for a processor with an instruction for x * y + z with one rounding."""
+    """Return True if the processor for which kernels are compiled can compute x * y + z with a single rounding."""
     if platform.machine().lower() not in ("x86_64", "amd64", "i386", "i686"):
-        return True  # all that Numba compiles for besides x86 have it
+        return True  # all other processors for which Numba compiles have the instruction
     if numba.config.CPU_FEATURES is not None:
         return "+fma" in numba.config.CPU_FEATURES.split(",")
     return bool(numba.config.ENABLE_AVX and HOST_FEATURES.get("fma"))
@@ -96,7 +97,7 @@ def splat(builder: ir.IRBuilder, value: ir.Value, width: int) -> ir.Value:
 
 
 def as_lane(context: Any, builder: ir.IRBuilder, value: ir.Value, fe_type: types.Type, width: int) -> ir.Value:
-    """Return an operand of a lane function as a vector: broadcast a number, leave a lane or a mask as it is."""
+    """Return an operand of a lane function as a vector: broadcast a number, return a lane or a mask unchanged."""
     if isinstance(fe_type, Lane | Mask):
         return value
     if fe_type != types.float64:
@@ -105,7 +106,7 @@ def as_lane(context: Any, builder: ir.IRBuilder, value: ir.Value, fe_type: types
 
 
 def common_width(arguments: Any) -> int | None:
-    """Return the width of the lanes among lanes and numbers; None for other arguments or lanes of several widths."""
+    """Return the common width of the lanes among lanes and numbers; None if widths differ, or for other types."""
     widths = {a.width for a in arguments if isinstance(a, Lane)}
     all_fit = all(isinstance(a, Lane | types.Float | types.Integer) for a in arguments)
     return widths.pop() if len(widths) == 1 and all_fit else None

@@ -1,14 +1,14 @@
-"""A SIMD value for Numba: `Lane(width)` holds one double for each of `width` cells, `Mask(width)` one truth value.
+"""Define SIMD values for Numba: `Lane(width)` holds one double for each of `width` cells, `Mask(width)` a truth value.
 
-Kernels are written once on lane values.  Width 1 is the scalar kernel, wider ones run several cells of a sweep in
-step with each other in one vector register.  Operators and functions are branch-free: both sides of a `select` are
-computed.
+Each kernel is written once, for lanes of any width.  Width 1 gives a scalar kernel.  A wider kernel runs several cells
+of a sweep at the same time in one vector register.  Operators and functions have no branches: both sides of a `select`
+are computed.
 
-Rounding.  A sum or difference with a product of lanes on one side is one fused multiply-add; with products on both
-sides, the first is fused.  The text alone decides this, so that all widths have the same bits: LLVM could choose
-otherwise from one width to the next, and gets no fast-math flags.  Infinities and NaN are those of IEEE 754.  On old
-processors without the instruction a multiply-add is a product and a sum, which rounds twice; the function of the C
-library, which LLVM would call, takes 30 times as long.
+Rounding.  If one side of a sum or difference is a product of lanes, the two operations become one fused multiply-add;
+if both sides are products, the first product is fused.  Only the text of the kernel decides about fusion, so that all
+widths give the same bits.  LLVM gets no fast-math flags, because LLVM could fuse differently at different widths.
+Infinities and NaN follow IEEE 754.  Old processors have no such instruction; there a multiply-add is a product and a
+sum, which round twice, because the C library's function `fma` takes 30 times as long.
 """
 
 from __future__ import annotations
@@ -48,11 +48,11 @@ __all__ = [
 # -- operators ---------------------------------------------------------------------------------------------------
 
 PRODUCT = "product"
-"""LLVM name of products of lanes: at width 1 a lane has the type of a number, whose products are not fused."""
+"""LLVM name of products of lanes.  At width 1 only the name tells lanes from numbers, whose products stay unfused."""
 
 
 def _factors(value: ir.Value) -> tuple[ir.Value, ir.Value] | None:
-    """Return the factors of a product of lanes; None for another value, also for a product that was loaded from memory."""
+    """Return the factors of a product of lanes; None for any other value, and for a product loaded from memory."""
     of_lanes = getattr(value, "opname", None) == "fmul" and value.name.startswith(PRODUCT)
     return tuple(value.operands) if of_lanes else None
 
@@ -71,11 +71,12 @@ def _multiply_add(builder: ir.IRBuilder, x: ir.Value, y: ir.Value, z: ir.Value) 
 
 
 def _exact_multiply_add(builder: ir.IRBuilder, x: ir.Value, y: ir.Value, z: ir.Value) -> ir.Value:
-    """x * y + z, rounded once; without the instruction, with an error of about one rounding."""
+    """x * y + z, rounded once if the processor has the instruction; else with an error of about one rounding."""
     if has_fma():
         return _call(builder, "fma", x, y, z)
     add, sub, mul = builder.fadd, builder.fsub, builder.fmul
-    # Dekker, Numer. Math. 18, 224, 1971: split the factors into halves of 26 bits by 2**27 + 1, whose products are exact.
+    # Dekker, Numer. Math. 18, 224, 1971: multiply by 2**27 + 1 to split each factor into halves of 26 bits; products of
+    # halves are exact.
     splitter = constant_like(x, 134217729.0)
     halves = []
     for value in (x, y):
@@ -92,7 +93,7 @@ def _exact_multiply_add(builder: ir.IRBuilder, x: ir.Value, y: ir.Value, z: ir.V
     added = sub(total, product)
     total_error = add(sub(product, sub(total, added)), sub(z, added))
     exact = add(total, add(total_error, product_error))
-    # The halves of large factors overflow.
+    # The halves of large factors overflow: return the sum that rounds twice then.
     return builder.select(builder.fcmp_ordered("ord", exact, exact), exact, total)
 
 
@@ -115,7 +116,7 @@ def _difference(builder: ir.IRBuilder, x: ir.Value, y: ir.Value) -> ir.Value:
 def _define_operator(
     function: Callable[..., Any], operands: Sequence[tuple[type, ...]], result: type, emit: Callable[..., ir.Value]
 ) -> None:
-    """Define an operator for operands of these Numba types; numbers are broadcast to the lanes beside them."""
+    """Define an operator for operands of these Numba types; a number is broadcast to the width of the other operand."""
 
     @infer_global(function)
     class _Typing(AbstractTemplate):
@@ -172,7 +173,7 @@ def _on_lanes(emit: Callable[..., ir.Value], arity: int) -> Any:
 
 
 def on_bits(emit: Callable[..., ir.Value], arity: int) -> Any:
-    """Return an intrinsic on lanes whose bits `emit(builder, *integers)` takes and returns as 64-bit integers."""
+    """Return an intrinsic on lanes; `emit(builder, *integers)` takes and returns their bits as 64-bit integers."""
 
     def on_doubles(builder: ir.IRBuilder, *values: ir.Value) -> ir.Value:
         doubles = values[0].type
@@ -187,9 +188,11 @@ def _llvm_function(name: str, arity: int) -> Any:
 
 
 def _extreme(relation: str) -> Any:
-    """Return the intrinsic for the smaller or larger of two numbers, and for the number if the other one is NaN.
+    """Return the intrinsic for the smaller or the larger of two numbers; if one of the two is NaN, it returns the
+    other.
 
-    LLVM's maxnum and minnum are not used: version 22 vectorises loops over nodes that take maxima by them, and loses some.
+    LLVM's maxnum and minnum are not used: LLVM 22 vectorises loops of maxima over nodes incorrectly and drops some
+    values.
     """
 
     def emit(builder: Any, x: Any, y: Any) -> Any:
@@ -215,7 +218,7 @@ scale_binary = on_bits(lambda b, x, shifted: b.add(x, b.shl(shifted, constant_li
 flip_if_odd = on_bits(lambda b, x, shifted: b.xor(x, b.shl(shifted, constant_like(x, 63))), 2)
 """-value for odd k, else value."""
 truncated = on_bits(lambda b, x: b.and_(x, constant_like(x, -1 << 44)), 1)
-"""The number cut to the first 9 bits of its significand, towards zero."""
+"""The number rounded towards zero to the first 9 bits of its significand."""
 
 
 @intrinsic
@@ -288,7 +291,7 @@ def _width_of(literal: Any) -> int | None:
 
 @intrinsic(prefer_literal=True)
 def one_lane(typingctx: Any, lane: Any, width: Any) -> Any:
-    """Return the mask that holds in one lane alone."""
+    """Return the mask that is True in one lane only."""
     size = _width_of(width)
     if size is None or not isinstance(lane, types.Integer):
         return None
@@ -315,20 +318,20 @@ def _pointer(context: Any, builder: Any, sig: Any, args: Any, width: int) -> Any
 
 @intrinsic(prefer_literal=True)
 def load(typingctx: Any, array: Any, slot: Any, width: Any) -> Any:
-    """Read lane number `slot` of a flat float64 array, or of memory by its address, in groups of `width` entries."""
+    """Read group number `slot` of `width` consecutive doubles, from a flat array or an address, as a lane."""
     size = _width_of(width)
     if size is None or not isinstance(slot, types.Integer):
         return None
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.load(_pointer(context, builder, sig, args, size), align=8)  # entries are aligned, lanes not
+        return builder.load(_pointer(context, builder, sig, args, size), align=8)  # entries are aligned, not lanes
 
     return Lane(size)(array, slot, width), lower
 
 
 @intrinsic
 def store(typingctx: Any, array: Any, slot: Any, value: Any) -> Any:
-    """Write a lane to a flat float64 array, or to memory by its address, as group number `slot`."""
+    """Write a lane as group number `slot` of consecutive doubles, to a flat array or an address."""
     if not isinstance(value, Lane) or not isinstance(slot, types.Integer):
         return None
 

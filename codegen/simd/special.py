@@ -1,6 +1,7 @@
 """Further elementary functions of lanes, composed of those in codegen/simd/elementary.py.
 
-`ERF` and `ERFCX` are our own Chebyshev fits in 40-digit arithmetic; beside each stands its error.
+The polynomials `ERF` and `ERFCX` are Chebyshev fits made for this file in 40-digit arithmetic; the text below each
+gives its largest error.
 """
 
 from __future__ import annotations
@@ -130,7 +131,7 @@ def atan2(y, x):
 
 @lane_function
 def ceiling(x):
-    """Return the smallest integer that is not smaller."""
+    """Return the smallest integer that is not smaller than x."""
     return -floor(-x)
 
 
@@ -160,4 +161,4 @@ def power(x, y):
 
 
 power_of_two = on_bits(lambda b, x: b.and_(x, constant_like(x, 0x7FF << 52)), 1)
-"""The largest power of two up to a positive number, which is its exponent bits alone; NaN becomes infinite."""
+"""The largest power of two that is not larger than a positive number: its exponent bits; NaN becomes infinite."""

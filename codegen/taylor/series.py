@@ -4,13 +4,14 @@ A Taylor method writes each subexpression u of the rates as a series
 
     u(t') = sum_k u_k ((t' - t)/scale)**k
 
-and computes u_k from coefficients 0 … k of its operands.  `scale` makes the coefficients of one state alike in size; every
-recurrence below is homogeneous in it, so that only the states (`x_(k+1) = scale/(k+1) * rate_k`) and time itself use it.
+and computes u_k from coefficients 0 … k of its operands.  `scale` is chosen so that the coefficients of a state have
+similar sizes.  No recurrence below contains `scale`: only the states (`x_(k+1) = scale/(k+1) * rate_k`) and time use
+it.
 
 Three forms cover all functions.  Here a' is the derivative with respect to (t' - t)/scale, so that k a_k are the
 coefficients of (t' - t) a' (`Slope`):
 
-* products, and quotients and roots by the product that they solve: u b = a gives u_k = (a_k - sum_{j=1..k} b_j u_(k-j))/b_0;
+* products; also quotients and roots, which solve a product: u b = a gives u_k = (a_k - sum_{j=1..k} b_j u_(k-j))/b_0;
 * functions whose derivative is a product, u' = g a': k u_k = sum_{j=1..k} j a_j g_(k-j) (`Integral`);
 * functions whose derivative is a quotient, u' w = a': k u_k w_0 = k a_k - sum_{j=1..k-1} j u_j w_(k-j)
   (`QuotientIntegral`).
@@ -18,9 +19,9 @@ coefficients of (t' - t) a' (`Slope`):
 Sources: R. E. Moore, Methods and Applications of Interval Analysis (SIAM, 1979), section 3.4; A. Griewank & A. Walther,
 Evaluating Derivatives (2nd ed., SIAM, 2008), section 13.2.
 
-A recurrence is written once, for an `Order` that supplies coefficients and convolutions: a step that is written out answers
-with sums of names at a certain k, one in loops with loops over orders.  Names of series in kernel text are those of the
-classes.
+Each recurrence is written once, for an `Order` that supplies coefficients and convolutions.  The `Order` of a
+written-out step returns sums of names for one k; the `Order` of a looped step returns loops over orders.  In kernel
+text, a series is named after its class.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ MINUS = Number(-1.0)
 
 
 class Order(Protocol):
-    """The order k that is being written: what a recurrence can use."""
+    """The order k that is being written, with the operations from which recurrences are built."""
 
     @property
     def inverse(self) -> Expression:
@@ -46,7 +47,7 @@ class Order(Protocol):
 
     @property
     def number(self) -> Expression:
-        """k > 0."""
+        """The order k > 0 as an expression."""
 
     def of(self, series: Series) -> Expression:
         """Return coefficient k of a series."""
@@ -58,18 +59,18 @@ class Order(Protocol):
         """Return the sum of base_j * base_(k-j) for j = first … k - first."""
 
     def save(self, name: str, value: Expression) -> Name:
-        """Compute a value once in a step, with coefficient 0, and return its name."""
+        """Compute a value once in a step, at order 0, and return the name of the variable."""
 
     def hint(self, series: Series) -> Expression:
-        """Return the side of zero, 1 or -1, on which a series lies just after it begins at zero; 0 if unknown."""
+        """Return, for a series that begins at zero, its sign just afterwards: 1, -1, or 0 if not yet known."""
 
 
 @dataclass(eq=False, slots=True)
 class Series:
-    """A power series under a name.
+    """A power series with a name.
 
-    Coefficient k needs coefficient k of the `linear` series, coefficients 0 … k of the `convolved` series, and coefficient 0
-    alone of the `started` series.  LINEAR, CONVOLVED and STARTED are the fields that hold them.
+    Coefficient k is computed from coefficient k of the `linear` series, coefficients 0 … k of the `convolved` series,
+    and coefficient 0 of the `started` series.  LINEAR, CONVOLVED and STARTED list the fields that hold these series.
     """
 
     name: str = field(default="", kw_only=True)
@@ -91,10 +92,10 @@ class Series:
 
     def _parts(self, names: tuple[str, ...]) -> tuple[Series, ...]:
         parts = (self if name == "self" else getattr(self, name) for name in names)
-        return tuple(part for part in parts if part is not None)  # the factor of an integral is set late
+        return tuple(part for part in parts if part is not None)  # None: the factor of an integral that is not set yet
 
     def begin(self, at: Order) -> Expression:
-        """Return coefficient 0, unless it is like the others."""
+        """Return coefficient 0; by default the formula of all other coefficients."""
         return self.coefficient(at)
 
     def coefficient(self, at: Order) -> Expression:
@@ -127,7 +128,7 @@ class State(Series):
 
 @dataclass(eq=False, slots=True)
 class Time(Series):
-    """Time: t, scale, 0, 0, …"""
+    """Time, whose coefficients are t, scale, 0, 0, …"""
 
 
 # -- arithmetic -------------------------------------------------------------------------------------------------------
@@ -228,9 +229,9 @@ class Slope(Series):
 
 @dataclass(eq=False, slots=True)
 class Integral(Series):
-    """u = f(a) from u' = c g a' with f'(a) = c g, c a number: exp, sin, tan, sinh, tanh, erf …
+    """u = f(a) from u' = c g a' with f'(a) = c g and a number c: exp, sin, tan, sinh, tanh, erf …
 
-    The factor g is set after the series was made, because it may contain u.
+    The factor g is set after the series u is created, because g may contain u.
     """
 
     function: str
@@ -251,9 +252,9 @@ class Integral(Series):
 
 @dataclass(eq=False, slots=True)
 class Exponential(Integral):
-    """u = exp(a) from u' = u a'; the step saves a_0 to look for a rise of u that is still too small to see.
+    """u = exp(a) from u' = u a'.  The step saves a_0, to find the time at which u rises even if u is 0 to rounding now.
 
-    steepness: the exponent as a multiple of a.
+    steepness: exponent / a.
     """
 
     steepness: ClassVar[float] = 1.0
@@ -269,7 +270,7 @@ class Exponential(Integral):
 
 @dataclass(eq=False, slots=True)
 class Sigmoid(Integral):
-    """u = 1/(c + d exp(a)), c and d positive numbers, from u' = -w a', w the `Crest` of the same; exp(a) may overflow."""
+    """u = 1/(c + d exp(a)) from u' = -w a'; c, d > 0 and w is the `Crest` of the same a, c, d.  exp(a) may overflow."""
 
     ends: tuple[float, float] = (1.0, 1.0)
 
@@ -280,7 +281,7 @@ class Sigmoid(Integral):
 
 @dataclass(eq=False, slots=True)
 class Peak(Exponential):
-    """A function of a that falls like an exponential on either side of 0."""
+    """A function of a that decays exponentially for a to infinity and for a to minus infinity."""
 
     def begin(self, at: Order) -> Expression:
         start = at.of(self.argument)
@@ -288,15 +289,15 @@ class Peak(Exponential):
         return self.value(start)
 
     def value(self, start: Expression) -> Expression:
-        """Return the value of the function where a is `start`."""
+        """Return the value of the function at a = `start`."""
         raise NotImplementedError
 
 
 @dataclass(eq=False, slots=True)
 class Crest(Peak):
-    """w = d exp(a) u**2, u the `Sigmoid`, from w' = (2 c u - 1) w a'.
+    """w = d exp(a) u**2 from w' = (2 c u - 1) w a'; u is the `Sigmoid`.
 
-    Coefficient 0 is d/((c + d exp(a)) (d + c exp(-a))), which keeps its digits where either exponential is tiny.
+    Coefficient 0 is d/((c + d exp(a)) (d + c exp(-a))): this form is accurate even if one of the exponentials is tiny.
     """
 
     ends: tuple[float, float] = (1.0, 1.0)
@@ -317,7 +318,7 @@ class Secant(Peak):
 
 @dataclass(eq=False, slots=True)
 class SquaredSecant(Peak):
-    """u = 1/cosh(a)**2 from u' = -2 u tanh(a) a': it has digits where 1 - tanh(a)**2 has none."""
+    """u = 1/cosh(a)**2 from u' = -2 u tanh(a) a'; accurate for large |a|, unlike 1 - tanh(a)**2."""
 
     steepness = 2.0
 
@@ -328,7 +329,7 @@ class SquaredSecant(Peak):
 
 @dataclass(eq=False, slots=True)
 class QuotientIntegral(Series):
-    """u = f(a) from u' w = c a' with f'(a) = c/w, c a number: log, atan, asin, acos …"""
+    """u = f(a) from u' w = c a' with f'(a) = c/w and a number c: log, atan, asin, acos …"""
 
     function: str
     argument: Series
@@ -351,7 +352,7 @@ class QuotientIntegral(Series):
 
 @dataclass(eq=False, slots=True)
 class Power(Series):
-    """u = a**e, e constant, from a u' = e a' u: k a_0 u_k = sum_{j=1..k} (e j - (k - j)) a_j u_(k-j).
+    """u = a**e with constant e from a u' = e a' u: k a_0 u_k = sum_{j=1..k} (e j - (k - j)) a_j u_(k-j).
 
     Since e j - (k - j) = (e + 1) j - k, the sum is (e + 1) sum j a_j u_(k-j) - k sum a_j u_(k-j).
     """
@@ -379,10 +380,11 @@ class Power(Series):
 
 @dataclass(eq=False, slots=True)
 class Kink(Series):
-    """The side of zero, 1 or -1, on which a series lies just after the start; 0 while all coefficients so far are zero.
+    """The sign, 1 or -1, of a series just after the start of the step; 0 while all coefficients so far are zero.
 
-    Its value is the same at all orders.  If the series begins at zero, up to rounding of the terms that it is the sum of,
-    the first coefficient that is not zero decides the side, and the step computes all coefficients again.
+    The sign is used unchanged at all orders.  A series begins at zero if coefficient 0 is smaller than the rounding
+    error of its terms.  The first nonzero coefficient then decides the sign, and the step computes all coefficients
+    again.
     """
 
     base: Series
@@ -392,27 +394,27 @@ class Kink(Series):
         return self.side(at, magnitude(at, self.base))
 
     def side(self, at: Order, terms: Expression) -> Expression:
-        """Return the side just after the start, from the size of the terms that the series begins with."""
+        """Return the sign just after the start; `terms` is the sum of the absolute terms of coefficient 0."""
         size = at.save(f"size_{self.name}", terms)
         start = Call("side_of", (at.of(self.base), self.least(size)))
         hint = 0.0 * Name("scale") if isinstance(self.base, Constant) else at.hint(self.base)
         return at.save(self.name, Call("side_or", (start, hint)))
 
     def least(self, size: Name) -> Expression:
-        """Return the distance from zero within which the series begins at zero, from the size of its terms."""
+        """Return the largest |coefficient 0| that counts as zero; `size` is the sum of the absolute terms."""
         return Name("ROUNDING") * size
 
     def coefficient(self, at: Order) -> Expression:
         return Name(self.name)
 
     def passages(self, side: Expression, stored: Stored) -> list[Statement]:
-        """Return the statements that end a step where the series leaves its side."""
+        """Return the statements that end a step where the series changes sign."""
         return [stored.passage(side, stored.size, "PASSED", Name("NEAREST") * "passed")]
 
 
 @dataclass(eq=False, slots=True)
 class Choice(Series):
-    """One of two series that agree where `kink` has its zero: `above` where the side is 1, `below` elsewhere."""
+    """One of two series that agree at the zero of `kink`: `above` if the sign is 1, else `below`."""
 
     kink: Kink
     above: Series
@@ -425,23 +427,23 @@ class Choice(Series):
 
 @dataclass(eq=False, slots=True)
 class Brink(Kink):
-    """The side of zero of a series where another one jumps; only an exact zero counts as zero."""
+    """The sign of a series at whose zeros another series jumps; only an exact zero counts as zero."""
 
     def least(self, size: Name) -> Expression:
         return ZERO
 
     def passages(self, side: Expression, stored: Stored) -> list[Statement]:
-        """Return the statements that end a step where the series leaves its side.
+        """Return the statements that end a step where the series changes sign.
 
-        A jump changes the rate, so the passage is exact to rounding (2e-15).  The second call measures rounding by the way
-        until the passage and not by the way of the whole step.
+        A jump changes the rate, so the passage must be exact to rounding (2e-15).  The second call compares with the
+        change of the series up to the passage, not with the change over the whole step.
         """
         return 2 * [stored.passage(side, 1e4 * stored.size, 2e-15, 0.01 * Name("nearest"))]
 
 
 @dataclass(eq=False, slots=True)
 class Leaping(Series):
-    """One of three series by the side, 1, 0 or -1, of a series with a brink."""
+    """One of three series, selected by a `Brink`, that is by the sign 1, 0 or -1 of another series."""
 
     brink: Brink
     above: Series
@@ -462,7 +464,7 @@ class Leaping(Series):
 
 @dataclass(eq=False, slots=True)
 class Fraction(Series):
-    """A series minus its floor just after the start; `turned` is the series, or the sum of which it is the negative."""
+    """A series minus its floor just after the start.  `turned` is the series itself, or minus the series."""
 
     base: Series
     turned: Series
@@ -477,7 +479,7 @@ class Fraction(Series):
 
 @dataclass(eq=False, slots=True)
 class Whole(Series):
-    """The floor of a series just after the start; the brinks are its distances from this whole number and from the next."""
+    """The floor of a series just after the start; the brinks watch the distances to this integer and to the next."""
 
     base: Series
     lower: Brink
@@ -492,12 +494,12 @@ class Whole(Series):
 
 
 def floor(at: Order, series: Series, fraction: Series) -> Expression:
-    """Return the floor of a series just after the start: one less if it begins at a whole number and falls."""
+    """Return the floor of a series just after the start: one less than at the start if it falls from an integer."""
     return add(Call("floor", (at.of(series),)), Call("minimum", (at.hint(fraction), ZERO)))
 
 
 def magnitude(at: Order, series: Series) -> Expression:
-    """Return the sum of the absolute terms that a series begins with; its rounding error is a small part of it."""
+    """Return the sum of the absolute values of the terms of coefficient 0, a scale for its rounding error."""
     if isinstance(series, Fraction):
         return magnitude(at, series.turned)
     parts = [at.of(series)]
@@ -511,7 +513,7 @@ def magnitude(at: Order, series: Series) -> Expression:
 
 
 def _one_of_two(side: Expression, above: Expression, below: Expression) -> Expression:
-    """Return `above` where the side is 1, else `below`; without a comparison where a product does the same."""
+    """Return `above` if the side is 1, else `below`; use a product instead of a comparison if possible."""
     if above == below:
         return above
     if above == times(MINUS, below):
@@ -524,11 +526,12 @@ def _one_of_two(side: Expression, above: Expression, below: Expression) -> Expre
 
 @dataclass(eq=False, slots=True)
 class Row(Series):
-    """One row of the forward substitution L y = r - (M - M_0) a, where M a = r are the rates and M_0 = L U.
+    """One row of the forward substitution L y = r - (M - M_0) a for the equations M a = r, with M_0 = L U.
 
-    Order k of M a = r gives M_0 a_k = r_k - sum_{j=1..k} M_j a_(k-j): the factors of M_0 serve all orders.  `entries` are
-    the factor and the series of the row of M by column, rows and columns in the order of elimination.  A symmetric matrix
-    takes half the operations.  `unknowns`, the whole solution, is set after all rows were made.
+    Order k of M a = r reads M_0 a_k = r_k - sum_{j=1..k} M_j a_(k-j), so that all orders use the factors of M_0.
+    `entries`: factor and series of each entry in this row of M, by column; rows and columns are numbered in the order
+    of elimination.  A symmetric matrix takes half the operations.  `unknowns`: the whole solution a, which is set after
+    all rows are created.
     """
 
     right: Series
@@ -546,7 +549,7 @@ class Row(Series):
 
     @property
     def moving(self) -> list[tuple[Expression, Series, Unknown]]:
-        """Return the entries that change within a step, each with the unknown that it multiplies."""
+        """Return the entries that change within a step, each with the unknown that the entry multiplies."""
         products = [(factor, series, self.unknowns[c]) for c, (factor, series) in self.entries.items()]
         return [(factor, series, a) for factor, series, a in products if not isinstance(series, Constant)]
 
@@ -555,7 +558,7 @@ class Row(Series):
         return tuple(s for _, series, unknown in self.moving for s in (series, unknown))
 
     def begin(self, at: Order) -> Expression:
-        # Gaussian elimination of this row of M_0 by the rows before it: row i of L, then row i of U
+        # eliminate this row of M_0 by all earlier rows: compute row i of L, then row i of U
         i = len(self.before)
         row = {c: times(factor, at.of(series)) for c, (factor, series) in self.entries.items()}
         for k, other in enumerate(self.before):
@@ -579,7 +582,7 @@ class Row(Series):
 
 @dataclass(eq=False, slots=True)
 class Unknown(Series):
-    """One unknown a of the back substitution U a = y; `after` are those of later rows by their columns."""
+    """One unknown a of the back substitution U a = y; `after` holds the unknowns of later rows, by column."""
 
     row: Row
     after: dict[int, Unknown]

@@ -1,9 +1,9 @@
-"""The series of right-hand sides as a graph, in which equal subexpressions are one series.
+"""Build the graph of the series of right-hand sides; equal subexpressions become one series.
 
-A `Template` (the rates of a kind of node or link, repeated parts named) is read once for every node or link of that kind.
-`SeriesGraph.read` goes down each expression and makes the series of its operands first, so that `SeriesGraph.series` is an
-order in which coefficients of one order can be computed.  All nodes read the same template in the same way, so that equal
-oscillators have equal bits.
+A `Template` holds the rates of a kind of node or link, with names for repeated parts.  `SeriesGraph.read` reads the
+template once for every node or link of the kind.  The series of operands are created before the series that use them,
+so that the coefficients of one order can be computed in the order of `SeriesGraph.series`.  Nodes of one kind read the
+same template in the same way, so that equal oscillators have equal bits.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ LANE_FUNCTIONS: dict[type[sp.Expr], str] = {
     sp.tanh: "tanh", sp.atan: "atan", sp.asin: "asin", sp.acos: "acos", sp.asinh: "asinh", sp.acosh: "acosh",
     sp.atanh: "atanh", sp.erf: "erf",
 }  # fmt: skip
-"""The analytic functions, and the function of lanes that computes coefficient 0; the derivative gives the other ones."""
+"""Analytic functions, each with the function on lanes for coefficient 0; further coefficients use the derivative."""
 
 ODD = (sp.sin, sp.tan, sp.sinh, sp.tanh, sp.atan, sp.asin, sp.asinh, sp.atanh, sp.erf)
 EVEN = (sp.cos, sp.cosh)
@@ -80,14 +80,14 @@ class InverseCosh(sp.Function):
 
 @dataclass(frozen=True, slots=True)
 class Template:
-    """Expressions with their repeated parts named: statements first, results last."""
+    """Expressions with names for repeated parts: the assignments of the names, then the results."""
 
     statements: tuple[tuple[sp.Symbol, sp.Expr], ...]
     results: tuple[sp.Expr, ...]
 
     @classmethod
     def of(cls, expressions: Sequence[sp.Expr], moving: Iterable[sp.Symbol], supply: Iterator[sp.Symbol]) -> Template:
-        """Name the repeated parts that change within a step, from the supply; `moving` are the symbols that change."""
+        """Name the repeated parts that change within a step: those with symbols in `moving`; `supply` yields names."""
         symbols = frozenset(moving)
         shared, reduced = sp.cse(with_jumps(expressions, symbols), symbols=supply, order="canonical")
         constant: dict[sp.Symbol, sp.Expr] = {}
@@ -103,18 +103,19 @@ class Template:
 
 
 class SeriesGraph:
-    """Makes the series of templates.
+    """Build and store the series of templates.
 
     Attributes
     ----------
     series : list of Series
-        All series, each behind those whose coefficients of the same order it needs.
+        All series; each follows the series whose coefficients of the same order it needs.
     inline, inline_start : set of Series
-        Series whose coefficients, or coefficients 0, are written where they are used.
+        Series whose coefficients (`inline_start`: coefficient 0 only) are written inline where they are used.
     watched : list of Series
-        Series that can be small to all orders and large soon after (`hidden`): they limit the step.
+        Series whose coefficients can all be tiny although the series is large soon after (`hidden`); they limit the
+        step.
     constants : list of Assign
-        The functions of parameters alone, computed once in a step.
+        Assignments of functions of parameters alone, which a step computes once.
     """
 
     def __init__(self, names: Names) -> None:
@@ -125,11 +126,11 @@ class SeriesGraph:
         self.watched: list[Series] = []
         self.constants: list[Assign] = []
         self.supplies: dict[str, Iterator[sp.Symbol]] = {}
-        # what has been made: series by kind and parts, names of constants, and the numbers that order differences
+        # caches: series by kind and parts, names of constants, and numbers that fix the sign of differences
         self.by_parts: dict[tuple[object, ...], Series] = {}
         self.constant_names: dict[sp.Expr, Name] = {}
         self.numbers: dict[Series, int] = {}
-        # the template that is being read: series of symbols, substitutes of constant symbols, series of expressions
+        # state of `read`: series by symbol, values of constant symbols, series by expression
         self.moving: dict[sp.Symbol, Series] = {}
         self.substitutes: dict[sp.Symbol, sp.Expr] = {}
         self.by_expression: dict[sp.Expr, Series] = {}
@@ -137,14 +138,14 @@ class SeriesGraph:
     def read(
         self, template: Template, moving: Mapping[sp.Symbol, Series], substitutes: Mapping[sp.Symbol, sp.Expr]
     ) -> list[Series]:
-        """Return the series of the results of a template, from those of `moving` symbols and values of constant ones."""
+        """Return the series of a template's results, given series of moving symbols and values of constant ones."""
         self.moving, self.substitutes, self.by_expression = dict(moving), dict(substitutes), {}
         for symbol, e in template.statements:
             self.moving[symbol] = self.of(e)
         return [self.of(e) for e in template.results]
 
     def finish(self, roots: Sequence[Series]) -> None:
-        """Drop what no root needs, name the other series, and find those to write where they are used."""
+        """Drop the series that no root needs, name all others, and choose the series to write inline."""
         self.series = self.behind(roots)
         unseen = hidden([*roots, *(kink.base for kink in self.kinks)])
         self.watched = [s for s in self.series if s in unseen]
@@ -153,7 +154,7 @@ class SeriesGraph:
         convolved = {used for s in self.series for used in s.convolved}
         for s in self.series:
             s.name = s.name or self.fresh(type(s).__name__.lower())
-            # a sum that is used once at its own order needs no name; a convolution reads all orders
+            # a sum that is used once, at the same order, needs no name; a convolution reads all orders, so it needs one
             if isinstance(s, Linear | Slope) and s not in convolved:
                 if uses[s] < 2:
                     self.inline.add(s)
@@ -168,17 +169,17 @@ class SeriesGraph:
 
     @property
     def kinks(self) -> list[Kink]:
-        """Return the kinks of series that move."""
+        """Return the kinks whose series change within a step."""
         return [s for s in self.series if isinstance(s, Kink) and not isinstance(s.base, Constant)]
 
     @property
     def gaps(self) -> list[Series]:
-        """Return the series whose zeros are kinks and whose error limits the step: sums of states have that of the states."""
+        """Return the series whose zeros are kinks, except sums of states: the errors of the states limit those."""
         return list(dict.fromkeys(kink.base for kink in self.kinks if not is_affine(kink.base)))
 
     @property
     def positive(self) -> list[Series]:
-        """Return the series that cannot pass zero: roots, and arguments of roots, powers and logarithms."""
+        """Return the series that must not pass zero: roots, and arguments of roots, powers and logarithms."""
         series: list[Series] = []
         for s in self.series:
             match s:
@@ -191,19 +192,19 @@ class SeriesGraph:
         return list(dict.fromkeys(series))
 
     def behind(self, roots: Iterable[Series]) -> list[Series]:
-        """Return the roots and all that they need for a coefficient, in the order of `series`."""
+        """Return the roots and all series that enter their coefficients, in the order of `series`."""
         used = needed(roots)
         return [s for s in self.series if s in used]
 
     # -- sums, products, choices ------------------------------------------------------------------------------
 
     def unique(self, kind: type[S], *parts: object) -> S:
-        """Return the series of this kind with these parts, which is made once."""
+        """Return the series of this kind with these parts; create it at the first call."""
         key = (kind, *parts)
         return cast("S", self.by_parts[key]) if key in self.by_parts else self.enter(key, kind(*parts))
 
     def enter(self, key: tuple[object, ...], series: S) -> S:
-        """Append a new series."""
+        """Append a new series to `series` and to the cache."""
         self.by_parts[key] = series
         self.series.append(series)
         return series
@@ -221,7 +222,7 @@ class SeriesGraph:
             return Constant(constant)
         if len(pairs) == 1 and pairs[0][0] == ONE and constant == ZERO:
             return pairs[0][1]
-        # a difference and its negative share a series: terms in the order of first use, the first factor positive
+        # a difference and its negative share one series: sort terms by first use, and make the first factor positive
         if len(pairs) == 2 and constant == ZERO and all(isinstance(factor, Number) for factor, _ in pairs):
             pairs.sort(key=lambda pair: self.numbers.setdefault(pair[1], len(self.numbers)))
             if _negative(pairs[0][0]):
@@ -230,14 +231,14 @@ class SeriesGraph:
         return self.unique(Linear, tuple(pairs), constant)
 
     def product(self, left: Series, right: Series) -> Series:
-        """Return left * right, constant factors in front."""
+        """Return left * right with constant factors in front."""
         if isinstance(left, Constant):
             return self.sum([(left.value, right)])
         if isinstance(right, Constant):
             return self.sum([(right.value, left)])
         (a, left), (b, right) = split(left), split(right)
-        # (c + f s) x becomes c x + f (s x), which has one series less and the same rounding; f of 1 or -1 and a difference
-        # from a state or from time can be exact, and are not multiplied out
+        # (c + f s) x becomes c x + f (s x): one series less, and the same rounding error.  exception: if f is 1 or -1
+        # and s is a state or time, the difference c + f s can be exact and is not expanded
         for one, other in ((left, right), (right, left)):
             if left is right or not isinstance(one, Linear) or len(one.terms) > 1 or one.constant == ZERO:
                 continue
@@ -249,7 +250,7 @@ class SeriesGraph:
         return self.sum([(times(a, b), inner)])
 
     def choice(self, gap: Series, *values: Series) -> Series:
-        """Return (above, below), which agree where a gap is zero, or (above, at zero, below), by the sign of the gap."""
+        """Return a choice by the sign of a gap: between (above, below) for a kink, or (above, at, below) for a jump."""
         if isinstance(gap, Constant) and isinstance(gap.value, Number):
             size, middle = gap.value.value, values[len(values) // 2]
             return values[0] if size > 0.0 else values[-1] if size < 0.0 else middle
@@ -289,7 +290,7 @@ class SeriesGraph:
             case Jump():
                 return self.choice(*map(self.of, e.args))
             case sp.floor():
-                # the brinks are the distances to the whole numbers below and above
+                # watch the distances to the integers below and above
                 series = self.of(e.args[0])
                 factor, inner = split(series)
                 fraction = self.unique(Fraction, series, inner if factor == MINUS else series)
@@ -299,7 +300,7 @@ class SeriesGraph:
                 return self.sigmoid(self.of(e.args[2]), (float(e.args[0]), float(e.args[1])))
             case InverseCosh():
                 return self.secant(self.of(e.args[0]))
-        # an even or odd function of -a is that of a, so that both share a series
+        # an even or odd function of -a follows from that of a: both share one series
         argument = self.of(e.args[0])
         factor, inner = split(argument)
         if factor != MINUS or type(e) not in (*ODD, *EVEN):
@@ -308,7 +309,7 @@ class SeriesGraph:
         return value if type(e) in EVEN else self.sum([(factor, value)])
 
     def constant(self, e: sp.Expr) -> Expression:
-        """Return the value of what does not change within a step: a number, a parameter, or a name that is computed once."""
+        """Return the value of a constant expression: a number, a parameter, or a name that the step computes once."""
         e = e.xreplace(self.substitutes)
         if e.is_number:
             return _double(e)
@@ -329,7 +330,7 @@ class SeriesGraph:
         return self.constant(constant), self.of(sp.Mul(*(f for f in factors if self.moves(f))))
 
     def term(self, e: sp.Expr) -> Series:
-        """Return the series of a product with a constant, or of series."""
+        """Return the series of a product of constants and series."""
         if not all(self.moves(f) for f in e.args):
             return self.sum([self.scaled(e)])
         above = [self.of(f) for f in _sorted(e.args) if not _is_divisor(f)]
@@ -351,14 +352,14 @@ class SeriesGraph:
             return self.unique(SquareRoot, self.of(base))
         if not exponent.is_Integer:
             return self.product(self.of(base ** (exponent - sp.S.Half)), self.of(sp.sqrt(base)))
-        # whole powers by repeated squaring
+        # integer powers by repeated squaring
         half = self.of(base ** (exponent // 2))
         if exponent % 2 == 0:
             return self.product(half, half)
         return self.product(self.of(base ** (exponent - 1)), self.of(base))
 
     def kinked(self, e: sp.Expr) -> Series:
-        """Return the series of an absolute value, of the largest or smallest of some values, or of a choice."""
+        """Return the series of an absolute value, of Max, of Min, or of a choice."""
         if isinstance(e, Piecewise):
             (piece, condition), *others = e.args
             pieces = self.of(piece), self.of(Piecewise(*others))
@@ -378,11 +379,11 @@ class SeriesGraph:
     # -- functions by their differential equations ------------------------------------------------------------
 
     def function(self, function: type[sp.Expr], argument: Series) -> Series:
-        """Return a function of a series, from the differential equation that its derivative makes."""
+        """Return a function of a series; the derivative gives the differential equation for the recurrence."""
         name, key = LANE_FUNCTIONS[function], (function, argument)
         if key in self.by_parts:
             return self.by_parts[key]
-        # the derivative by the argument a, and its numerical factor
+        # split the derivative with respect to a into a numerical factor and the remaining expression
         a = sp.Dummy("a", real=True)
         derivative = function(a).diff(a)
         number = sp.Mul(*(f for f in sp.Mul.make_args(derivative) if f.is_number))
@@ -395,7 +396,7 @@ class SeriesGraph:
         slope, kind = self.unique(Slope, argument), Exponential if function is sp.exp else Integral
         integral = self.enter(key, kind(name, argument, slope, value, name=self.fresh(name)))
         if function is sp.tanh:
-            # a separate series for 1/cosh(a)**2 has digits where 1 - tanh(a)**2 has none
+            # for large |a|, a separate series for 1/cosh(a)**2 is accurate; 1 - tanh(a)**2 is not
             bell = SquaredSecant("cosh", argument, slope, -2.0, name=self.fresh("squaredsecant"))
             self.series.append(bell)
             integral.factor, bell.factor = bell, self.product(integral, bell)
@@ -404,7 +405,7 @@ class SeriesGraph:
         return integral
 
     def of_argument(self, e: sp.Expr, symbol: sp.Symbol, argument: Series) -> Series:
-        """Return the series of an expression in one symbol, which stands for a series."""
+        """Return the series of an expression in `symbol`, with `argument` as the series of the symbol."""
         outer = self.moving, self.by_expression
         self.moving, self.by_expression = {symbol: argument}, {}
         series = self.of(e)
@@ -412,7 +413,7 @@ class SeriesGraph:
         return series
 
     def sigmoid(self, argument: Series, ends: tuple[float, float]) -> Series:
-        """Return 1/(c + d exp(a)) of a series, which neither the overflow nor the underflow of exp(a) spoils."""
+        """Return 1/(c + d exp(a)) of a series a, accurate even if exp(a) overflows or underflows."""
         key = (Sigmoid, argument, ends)
         if key not in self.by_parts:
             slope = self.unique(Slope, argument)
@@ -424,7 +425,7 @@ class SeriesGraph:
         return self.by_parts[key]
 
     def secant(self, argument: Series) -> Series:
-        """Return 1/cosh(a) of a series, with cosh(a) that may overflow."""
+        """Return 1/cosh(a) of a series a, accurate even if cosh(a) overflows."""
         key = (Secant, argument)
         if key not in self.by_parts:
             slope, tanh = self.unique(Slope, argument), self.function(sp.tanh, argument)
@@ -441,7 +442,7 @@ def split(series: Series) -> tuple[Expression, Series]:
 
 
 def inverse_of(e: sp.Expr) -> sp.Expr | None:
-    """Return 1/e of c + d exp(a), c and d positive numbers, or of cosh(a); None of others."""
+    """Return 1/e if e is cosh(a), or c + d exp(a) with positive numbers c and d; None otherwise."""
     if isinstance(e, sp.cosh):
         return InverseCosh(e.args[0])
     if e.is_Add and len(e.args) == 2:
@@ -458,7 +459,7 @@ def _double(e: sp.Expr) -> Number:
 
 
 def _is_divisor(e: sp.Expr) -> bool:
-    """Return True for a power by which a `Ratio` divides."""
+    """Return True for a power that becomes the divisor of a `Ratio`."""
     if not (e.is_Pow and e.exp.is_number and e.exp.is_negative and (2 * e.exp).is_Integer):
         return False
     return not e.exp.is_Integer or inverse_of(e.base) is None

@@ -1,7 +1,7 @@
-"""What a step does with the series that it makes together, wherever their coefficients are: in names or in memory.
+"""Write the statements for a group of series; subclasses store coefficients in named variables or in memory.
 
-A writer is the `Order` that recurrences use.  `make` writes coefficients; the other methods return the statements that follow
-them: sides of kinks, sizes that limit the step, passages, checks.
+A writer is the `Order` that recurrences use.  `make` writes coefficients.  The other methods return the statements that
+follow the coefficients: signs of kinks, sizes that limit the step, passages, checks.
 """
 
 from __future__ import annotations
@@ -22,9 +22,10 @@ from .step_length import distant, last_orders, unseen
 
 @dataclass(frozen=True, slots=True)
 class Gaps:
-    """The two gaps of a contact (`Event.gaps`), by its mode, and the sizes of the terms that they begin with.
+    """The two gaps of a contact (`Event.gaps`), the contact's mode, and the sizes of the terms of coefficient 0.
 
-    names: of these sizes; stuck: the name of what is 1 in stick, 0 in slip; room: memory for one of the series.
+    names: the variables with these sizes; stuck: the variable that is 1 in stick and 0 in slip; room: memory for one
+    gap.
     """
 
     mode: str
@@ -37,10 +38,10 @@ class Gaps:
 
 @dataclass(eq=False)
 class SeriesWriter(Order):
-    """Series that are made together up to some order.
+    """A group of series that are computed together up to some order.
 
-    `Lines` of a step that is written out has its coefficients in names, `SeriesLoop` of one in loops has them in memory.
-    saved: the names of what is computed once in a step; zeros: an expression that is zero in all lanes.
+    `Lines` (written-out steps) stores coefficients in named variables; `SeriesLoop` (looped steps) stores them in
+    memory. saved: the names of values that a step computes once; zeros: an expression that is zero in all lanes.
     """
 
     graph: SeriesGraph
@@ -54,15 +55,15 @@ class SeriesWriter(Order):
 
     @abstractmethod
     def at(self, series: Series, k: int) -> Expression:
-        """Return coefficient k of a series that has been made."""
+        """Return coefficient k of a series, which must have been written before."""
 
     @abstractmethod
     def define(self, series: Series, value: Expression, inline: bool) -> None:
-        """Give the coefficient of a series its value, which may be written where it is used."""
+        """Set the coefficient of a series to a value; if `inline`, the value is written where it is used."""
 
     @abstractmethod
     def recall(self, name: str) -> Expression:
-        """Return a value that is saved for the whole step."""
+        """Return a value that was saved for the whole step."""
 
     @abstractmethod
     def assign(self, name: str, value: Expression) -> Statement:
@@ -70,15 +71,15 @@ class SeriesWriter(Order):
 
     @abstractmethod
     def signs(self, series: Series) -> list[Statement]:
-        """Return the statements that find the `side` of a series by its coefficients from order 1 on."""
+        """Return the statements that set `side` to the sign of a series' first nonzero coefficient from order 1 on."""
 
     @abstractmethod
     def weight(self, name: str) -> Name:
-        """Return the name of the weight of a series."""
+        """Return the name of the variable with the weight of a series."""
 
     @abstractmethod
     def add_size(self, k: int, size: Expression) -> list[Statement]:
-        """Let the size of a coefficient of order k, in units of the error that it may have, limit the step."""
+        """Let a coefficient of order k limit the step; `size` is the coefficient in units of its allowed error."""
 
     @abstractmethod
     def end_value(self, series: Series, name: str) -> tuple[list[Statement], Expression]:
@@ -86,14 +87,14 @@ class SeriesWriter(Order):
 
     @abstractmethod
     def stored(self, series: Sequence[Series], sizes: Sequence[Expression]) -> tuple[list[Statement], list[Stored]]:
-        """Return where coefficients of some series are in memory, and the statements that store them there."""
+        """Return statements that store the coefficients of series in memory, and the positions in memory."""
 
     def near(self, series: Series, passages: Sequence[Statement]) -> list[Statement]:
-        """Return the passages of a series, to be run if the series comes as far as zero."""
+        """Return the passages of a series, guarded by a test if the series can reach zero in this step."""
         return list(passages)
 
     def in_loop(self, statements: list[Statement]) -> list[Statement]:
-        """Return statements as often as the part has series of one kind."""
+        """Return statements in the loop of the section, if there is one, so that they run for each node or link."""
         return statements
 
     # -- coefficients -----------------------------------------------------------------------------------------------
@@ -103,14 +104,14 @@ class SeriesWriter(Order):
         self.statements += statements
 
     def named(self, name: str, value: Expression) -> Expression:
-        """Return a value under a name, unless it is a name or a number."""
+        """Assign a value to a variable and return the name; return a name or a number unchanged."""
         if isinstance(value, Name | Number):
             return value
         self.put(let(name, value))
         return Name(name)
 
     def make(self, series: Iterable[Series], first: bool) -> None:
-        """Write coefficient 0 of some series, or a later one."""
+        """Write coefficient 0 of the series if `first`, else coefficient k."""
         inlined = self.graph.inline_start if first else self.graph.inline
         for s in series:
             self.define(s, s.begin(self) if first else s.coefficient(self), s in inlined)
@@ -122,18 +123,18 @@ class SeriesWriter(Order):
 
     @property
     def hints(self) -> list[str]:
-        """Return the names of the sides of series that begin at zero."""
+        """The names of the variables with the signs of series that begin at zero."""
         return list(dict.fromkeys(f"hint_{kink.base.name}" for kink in self.graph.kinks))
 
     def forget_sides(self) -> list[Statement]:
         return self.in_loop([self.assign(hint, self.zeros) for hint in self.hints])
 
     def find_sides(self) -> list[Statement]:
-        """Return the statements that save the sides which coefficients show."""
+        """Return the statements that save the signs of series that begin at zero, found from their coefficients."""
         return self.in_loop([self.find_side(kink) for kink in self.graph.kinks])
 
     def find_side(self, kink: Kink) -> Statement:
-        """Return the statement that saves the side of one kink whose series begins at zero."""
+        """Return the statement that saves the sign of the series of one kink, if the series begins at zero."""
         begun = self.recall(kink.name)
         side = [
             let("side", 0.0 * Name("t")),
@@ -147,7 +148,7 @@ class SeriesWriter(Order):
     # -- step length ------------------------------------------------------------------------------------------------
 
     def lengths(self) -> list[Statement]:
-        """Return the statements by which the gaps of kinks and contacts limit the step."""
+        """Return the statements that let the gaps of kinks and contacts limit the step."""
         statements = [statement for s in self.graph.gaps for statement in self.counted(s)]
         for gaps in self.contacts:
             for s, name, size in zip(gaps.series, gaps.names, gaps.sizes, strict=True):
@@ -155,11 +156,11 @@ class SeriesWriter(Order):
         return statements
 
     def watches(self) -> list[Statement]:
-        """Return the statements by which the watched series limit the step."""
+        """Return the statements that let the watched series limit the step."""
         return [s for w in self.graph.watched for s in unseen([self.at(w, k) for k in range(self.order)])]
 
     def distances(self) -> list[Statement]:
-        """Return the statements that end the step before exponentials rise which are too small to be seen."""
+        """Return the statements that end the step before an exponential rises that is zero in double precision now."""
         exponentials = [s for s in self.graph.series if isinstance(s, Exponential)]
         return self.in_loop([statement for s in exponentials for statement in self.distance(s)])
 
@@ -172,13 +173,13 @@ class SeriesWriter(Order):
         return times(Number(1.0 / k), self.at(series.slope, k))
 
     def counted(self, series: Series) -> list[Statement]:
-        """Let the last coefficients of a series limit the step, by the relative tolerance of its low ones."""
+        """Let the last coefficients of a series limit the step; the tolerance is relative to the low coefficients."""
         if all(self.at(series, k) == ZERO for k in last_orders(self.order)):
             return []
         return self.weighed(series, series.name, Name("rtol") * self.low(series))
 
     def low(self, series: Series) -> Expression:
-        """Return the largest of the first three coefficients of a series, at most the period of an angle."""
+        """Return the largest of a series' first three absolute coefficients; at most the period for an angle."""
         size = largest(absolute(e) for k in range(3) if (e := self.at(series, k)) != ZERO)
         return within(size, series.period) if isinstance(series, State) else size
 
@@ -194,7 +195,7 @@ class SeriesWriter(Order):
     # -- end of the step --------------------------------------------------------------------------------------------
 
     def passages(self, exact: bool) -> list[Statement]:
-        """Return the statements that end the step where a series passes a kink or closes a contact."""
+        """Return the statements that end the step where a series reaches a kink or a gap of a contact closes."""
         statements = [statement for kink in self.graph.kinks for statement in self.passage(kink)]
         for gaps in self.contacts:
             stores, both = self.stored(gaps.series, gaps.sizes)
@@ -202,20 +203,20 @@ class SeriesWriter(Order):
         return self.in_loop(statements)
 
     def passage(self, kink: Kink) -> list[Statement]:
-        """Return the statements that end the step where a series passes one kink."""
+        """Return the statements that end the step where the series of one kink passes zero."""
         stores, (stored,) = self.stored([kink.base], [self.recall(f"size_{kink.name}")])
         return self.near(kink.base, [*stores, *kink.passages(self.recall(kink.name), stored)])
 
     def broken(self) -> list[Statement]:
-        """Return the statements that make the step NaN where a series passes zero that cannot.
+        """Return the statements that make the step NaN if a series passes zero that must stay positive.
 
-        The polynomial that a step sums can pass zero where a root or the argument of a logarithm cannot.
+        The truncated series of a root, or of the argument of a logarithm, can pass zero, although the function cannot.
         """
         positive = enumerate(self.graph.positive)
         return self.in_loop([statement for k, s in positive for statement in self.breaks(s, f"positive_{k}")])
 
     def breaks(self, s: Series, name: str) -> list[Statement]:
-        """Return the statements that make the step NaN where one series passes zero: log of a negative share."""
+        """Return the statements that make the step NaN if one series passes zero: the logarithm of end/start."""
         statements, end = self.end_value(s, name)
         share = over(end, times(ONE, self.at(s, 0)))
         return [*statements, let("total", Name("total") + 0.0 * call("log", share))]

@@ -1,6 +1,7 @@
-"""Sums, products and quotients that are folded when they are made.
+"""Make sums, products and quotients, and simplify each as it is made.
 
-Recurrences are built of them and never rearranged afterwards: a step of order 24 has thousands.
+Recurrences are built from these functions.  A step of order 24 has thousands of terms, so no later pass rearranges
+them.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from ..program.expressions import (
 
 
 def add(*terms: Expression) -> Expression:
-    """Return the sum, without zeros, its numbers together at the end."""
+    """Return the sum without zero terms; add up all numbers to one last term."""
     number = 0.0
     others: list[Expression] = []
     for term in (part for e in terms for part in terms_of(e)):
@@ -38,7 +39,7 @@ def add(*terms: Expression) -> Expression:
 
 
 def times(*factors: Expression) -> Expression:
-    """Return the product; its numbers become one in front, its signs one negation."""
+    """Return the product; multiply all numbers to one first factor, and all signs to one negation."""
     number = 1.0
     others: list[Expression] = []
     for factor in factors:
@@ -78,7 +79,7 @@ def largest(values: Iterable[Expression]) -> Expression:
 
 
 def extreme(function: str, values: Sequence[Expression]) -> Expression:
-    """Return nested calls of a function of two values, a balanced tree: short chains of dependent operations."""
+    """Return nested calls of a function of two values as a balanced tree, which has short chains of dependences."""
     if len(values) == 1:
         return values[0]
     half = len(values) // 2

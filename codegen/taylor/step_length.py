@@ -1,13 +1,13 @@
-"""How long a Taylor step may be.
+"""Compute the length of a Taylor step.
 
-A series whose last coefficients have size s_k, in units of the error that it may have, reaches s_k**(-1/k) of `scale`: there
-its term of order k is as large as that error.  This is the step length of A. Jorba & M. Zou, Experimental Mathematics 14, 99
-(2005), section 3.2, from the last three coefficients instead of two, because series with zeros at every second or third
-place would pass for exact ones.
+Let s_k be the size of coefficient k of a series in units of the allowed error.  After s_k**(-1/k) times `scale`, the
+term of order k is as large as the allowed error, so the step must end there.  This is the step length of A. Jorba & M.
+Zou, Experimental Mathematics 14, 99 (2005), section 3.2.  Here the last three coefficients are used instead of the last
+two: a series in which every second or third coefficient is zero would seem exact otherwise.
 
-Three more limits follow: no step is longer than FARTHEST times the `scale` of its coefficients; none goes behind the place
-where the terms of a watched series stop falling (`unseen`); none goes on to where an exponential rises that is zero in
-double precision now (`distant`).
+Three further limits hold.  No step is longer than FARTHEST times `scale`.  No step goes beyond the point where the
+terms of a watched series stop decreasing (`unseen`).  No step goes beyond the point where an exponential rises that is
+zero in double precision now (`distant`).
 """
 
 from __future__ import annotations
@@ -22,37 +22,45 @@ FARTHEST = 16.0
 """The longest step, in units of `scale`; a choice."""
 
 NEXT = 2.0
-"""The longest step where series are watched, so that a series that is zero in double precision now is seen when it begins.
+"""The longest step with watched series, in units of `scale`: a series that is zero in double precision now appears in
+time.
 
-Contacts end their slips by events: the first steps behind one would be a third of all steps.
+Equations with contacts are exempt: events end each slip, and short first steps would be a third of all steps.
 """
 
 LOW = (1, 2, 3)
-"""The low orders with which high ones are compared, beside the last one below half the highest.
+"""The low orders; high orders are compared with these, and with the last order below half of the highest.
 
-The series of x' = v, v' = -x**n from x = 0 has its coefficients n + 1 orders apart: of those of x**n, n or 2 n + 1 is high.
+Example: for x' = v, v' = -x**n from x = 0, the nonzero coefficients are n + 1 orders apart, so that of the coefficients
+of x**n, order n or order 2 n + 1 is a high order.
 """
 
 HIDDEN, LOST = 1e-9, 1e-110
-"""Least size of the low coefficients of a series, as shares of the high ones and of the absolute tolerance; choices.
+"""Least size of the low coefficients: HIDDEN times the high coefficients, plus LOST times the absolute tolerance;
+choices.
 
-The first is for zeros of the low ones alone, the second for zeros of high order, which no step would reach otherwise.
+HIDDEN applies if only the low coefficients vanish.  LOST applies at zeros of high order, which no step would reach
+without LOST.
 """
 
 REMOTE, NEARER = 230.0, 100.0
-"""Exponentials of less than -REMOTE (1e-100) are in no coefficient; least rise of the exponent in a step from there."""
+"""REMOTE: exponentials below exp(-REMOTE) = 1e-100 affect no coefficient.  NEARER: a step may always raise them by
+this.
+
+Both are exponents.
+"""
 
 SEEN = let("unseen", 0.0 * Name("scale"))
-"""The initial value of `unseen`."""
+"""Sets `unseen` to zero at the beginning of a step."""
 
 
 def last_orders(order: int) -> tuple[int, int, int]:
-    """Return the orders whose coefficients decide how far a series reaches."""
+    """Return the three orders whose coefficients determine the step length."""
     return order, order - 1, order - 2
 
 
 def reach(orders: Sequence[int]) -> Expression:
-    """Return the logarithm of the share of `scale` that a step may go, from `size_…` of some orders."""
+    """Return the logarithm of (step length)/scale, computed from the variables `size_…` of some orders."""
     return extreme("minimum", [times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))) for k in orders])
 
 
@@ -74,9 +82,9 @@ def unseen(coefficients: Sequence[Expression]) -> list[Statement]:
 
 
 def bounded(coefficients: Sequence[Expression]) -> list[Statement]:
-    """Return the statements for `way`; way * ratio bounds the change of a series within a step.
+    """Return the statements that compute `way`; way * ratio bounds the change of a series within a step.
 
-    `coefficients` are those of order 1 and more: way = |c_1| + |c_2| ratio + … by Horner's rule.
+    `coefficients` begin with order 1: way = |c_1| + |c_2| ratio + … by Horner's rule.
     """
     sizes = [absolute(e) if e != ZERO else e for e in coefficients]
     while sizes and sizes[-1] == ZERO:
@@ -88,10 +96,10 @@ def bounded(coefficients: Sequence[Expression]) -> list[Statement]:
 
 
 def distant(start: Expression, coefficients: Sequence[Expression]) -> list[Statement]:
-    """Return the statements that end a step before an exponential rises which is far too small to be seen.
+    """Return the statements that end a step before an exponential rises that is zero in double precision now.
 
-    It is zero to every digit, with all its coefficients; its exponent, `start` and `coefficients` from order 1 on, tells
-    where it rises.
+    All coefficients of the exponential are zero too.  The series of the exponent shows where the exponential rises:
+    `start` is its coefficient 0, `coefficients` are those from order 1 on.
     """
     bound = bounded(coefficients)
     if not bound:
@@ -109,13 +117,13 @@ def distant(start: Expression, coefficients: Sequence[Expression]) -> list[State
 
 
 def finished(order: int, watched: bool, contacts: bool) -> list[Statement]:
-    """Return the statements for `length` and `ratio` from `reach`, the logarithm of the step's share of `scale`."""
+    """Return the statements that compute `ratio` = exp(reach), the share of `scale`, and the step's `length`."""
     falling = call("minimum", *(times(Number(-1.0 / k), call("log", "unseen")) for k in (order - 2, order // 2)))
     farthest = NEXT if watched and not contacts else FARTHEST
     far = call("truncated", Name("scale") * call("exp", "reach"))
     return [
         *([let("reach", call("minimum", "reach", falling))] if watched else []),
-        # weights are those of a step as long as `scale`; a shorter one changes the states less
+        # weights hold for a step of length `scale`; in a shorter step the states change less
         let("reach", call("minimum", "reach", (order - 2) / (order - 4) * Name("reach"))),
         let("length", call("minimum", far, farthest * Name("scale"))),
         let("length", call("minimum", "length", "h")),

@@ -1,12 +1,13 @@
-"""A Taylor step of an orbit and of the deviations along it.
+"""Write a Taylor step of an orbit and of the deviations along the orbit.
 
-The tangent of a Taylor step is the Taylor step of orbit and deviations together: the recurrences also hold for derivatives
-by initial states (R. Barrio, SIAM Journal on Scientific Computing 27, 1929 (2006)).  Of d' = A d the coefficients are
+The derivative of a Taylor step with respect to the initial state is the Taylor step of orbit and deviations together,
+because differentiated recurrences have the same form (R. Barrio, SIAM Journal on Scientific Computing 27, 1929 (2006)).
+The coefficients of d' = A d are
 
     d_(k+1) = scale/(k+1) sum_j A_j d_(k-j)
 
-where the series of A follows from the orbit alone.  A step of the orbit stores it in a short shared array, from which every
-mode takes a step of its own deviations.  The orbit is scalar; a register holds one deviation for each of LANES modes.
+where the series of A depends on the orbit only.  The orbit's step stores the series of A in a short shared array; the
+step of each mode reads this array.  The orbit is scalar; a register holds one deviation for each of LANES modes.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from .taylor_step import TaylorStep, check_order
 from .unrolled_series import SQUARE, Lines, UnrolledSeries, polynomial
 
 HEAD = 2
-"""Number of entries at the beginning of the shared array: `scale` of the orbit's step, and its length."""
+"""Number of entries at the beginning of the shared array: `scale` and length of the orbit's step."""
 
 COMMON = '''
 @njit(error_model="numpy")
@@ -46,7 +47,7 @@ def common_length(lengths, longest, new, place):
             longest = min(longest, new[place*LANES + lane])
     return longest
 '''.strip()
-"""A mode whose step is at most a 32nd shorter (0.96875 = 31/32) goes along: its error grows by (32/31)**order at most."""
+"""Text that lets a mode take the orbit's step if its own is at least 31/32 of it; the error grows by (32/31)**order."""
 
 CARRY = '''
 @njit(error_model="numpy", cache=True)
@@ -61,12 +62,12 @@ def carry(shared, strengths, old, new, registers, tolerance):
 '''.strip()
 
 LEAST = sys.float_info.min
-"""The smallest number of full precision, added to the error of a deviation that is zero."""
+"""The smallest normal double, added to the allowed error so that a zero deviation does not divide by zero."""
 
 
 @dataclass(frozen=True, slots=True)
 class TangentStep:
-    """The text of `step` for the orbit, and of the functions that step its modes.
+    """The text of the orbit's function `step`, and of the functions that advance the modes.
 
     shared: the length of the array in which the orbit stores the series of A.
     """
@@ -77,18 +78,18 @@ class TangentStep:
 
 
 class OrbitWriter(UnrolledSeries):
-    """Writes the step of an orbit, which stores the series of some coefficients of A.
+    """Write the step of an orbit; the step stores the series of the coefficients of A that move.
 
     Attributes
     ----------
     coefficients_of_a : list of Expression
-        The coefficients, in the symbols of the network.
+        The coefficients of A in the symbols of the network.
     names_of_a : dict
-        Their names in the step of a mode; those that are one series have one name.
+        Name of each coefficient in the step of a mode; coefficients with the same series share a name.
     stored_values : dict
-        Their series by name and order: a number, or the name of an entry of the shared array.
+        Coefficient of each series by name and order: a number, or the name of an entry of the shared array.
     slots : dict
-        The entries of the shared array by name.
+        Index of each entry of the shared array by name.
     """
 
     def __init__(self, equations: Equations, order: int, coefficients_of_a: Sequence[sp.Expr]) -> None:
@@ -97,7 +98,7 @@ class OrbitWriter(UnrolledSeries):
         self.stored_values: dict[tuple[str, int], Expression] = {}
         self.slots: dict[str, int] = {}
         super().__init__(equations, order)
-        self.exact = True  # deviations feel the time of an event to first order
+        self.exact = True  # an error in the time of an event changes deviations to first order
 
     def read(self) -> dict[State, Series]:
         rates = super().read()
@@ -112,7 +113,7 @@ class OrbitWriter(UnrolledSeries):
         super().make(k)
         if k == 0:
             self.lines.put(store("shared", 0, "scale"))
-        # coefficients of A up to the last but one order, behind the HEAD of the shared array
+        # store the coefficients of A, except the last order, behind the HEAD entries of the shared array
         for number, series in enumerate(self.noted if k < self.order else ()):
             name, value = f"a{number}_{k}", self.lines.of(series)
             if not isinstance(value, Number):
@@ -123,14 +124,14 @@ class OrbitWriter(UnrolledSeries):
 
 
 class ModeWriter(Lines):
-    """Writes the step of the modes in one register, from what the step of an orbit stores."""
+    """Write the step of the modes in one register; the step reads the series that the orbit's step has stored."""
 
     def __init__(self, variation: Variation, orbit: OrbitWriter) -> None:
         super().__init__(SeriesGraph(Names([s.name for s in variation.parameters])), orbit.order)
         self.size, self.names_of_a, strengths = variation.size, orbit.names_of_a, variation.parameters
         self.series_of_a = {name: State(name=name) for name in orbit.names_of_a.values()}
         self.values |= {(self.series_of_a[name], k): value for (name, k), value in orbit.stored_values.items()}
-        # load what is shared, and strengths and deviations of the modes in this register
+        # load `scale`, then strengths and deviations of the modes in this register
         self.put(let("scale", Load("shared", Number(0), None)))
         for k, s in enumerate(strengths):
             self.put(let(s.name, Load("strengths", _register(len(strengths), k), "LANES")))
@@ -143,7 +144,7 @@ class ModeWriter(Lines):
         self.graph.finish([*self.rates.values()])
 
     def rate(self, variation: Variation, row: int, deviations: Sequence[State]) -> Series:
-        """Return a row of A d: products for entries of A that are constant, convolutions for those that move."""
+        """Return a row of A d: products for constant entries of A, convolutions for entries that move."""
         terms: list[tuple[Expression, Series]] = []
         for (r, c), e in variation.matrix:
             if r != row:
@@ -155,7 +156,7 @@ class ModeWriter(Lines):
                     terms.append((factor, self.graph.product(series, deviations[c])))
                 else:
                     fixed = add(fixed, times(factor, self.of(series)))
-            if not isinstance(fixed, Number | Name):  # the factor of all orders is computed once
+            if not isinstance(fixed, Number | Name):  # compute a factor that all orders share once
                 self.put(let(f"g{r}_{c}", fixed))
                 fixed = Name(f"g{r}_{c}")
             if fixed != ZERO:
@@ -167,7 +168,7 @@ class ModeWriter(Lines):
         for k in range(self.order + 1):
             self.coefficients(k)
 
-        # the length: the last three coefficients are small beside the deviation at the beginning of the step
+        # step length: the last three terms must be small relative to the deviation at the start of the step
         self.put(Comment("step length"), let("size", largest(absolute(self.at(d, 0)) for d in self.rates)))
         self.put(let("weight", 1.0 / (Name("tolerance") * "size" + LEAST)))
         last = {k: [absolute(e) for d in self.rates if (e := self.at(d, k)) != ZERO] for k in last_orders(self.order)}
@@ -203,7 +204,7 @@ class ModeWriter(Lines):
 
 
 def write_tangent(variation: Variation, order: int) -> TangentStep:
-    """Return the Taylor step of some order of an orbit and of deviations along it."""
+    """Return the Taylor step of this order for an orbit and the deviations along the orbit."""
     if variation.orbit.inertial:
         raise ValueError("taylor: found a mass matrix beside deviations along an orbit; expected the identity")
     if not is_analytic(variation.orbit):
@@ -219,6 +220,6 @@ def write_tangent(variation: Variation, order: int) -> TangentStep:
 
 
 def _register(size: int, k: int) -> Expression:
-    """Return the index of register k of a group of modes, in an array with `size` registers for each group."""
+    """Return the index of register k of the current group of modes; each group has `size` registers."""
     group = Name("which") if size == 1 else size * Name("which")
     return group + k if k else group

@@ -1,7 +1,8 @@
-"""One Taylor step as a program, whatever holds the coefficients: names (`unrolled_series`) or memory (`looped_series`).
+"""Write one Taylor step as a program, with coefficients in variables (`unrolled_series`) or memory (`looped_series`).
 
-The step computes the coefficients of the states up to its order, chooses its length from the last of them (`step_length`),
-ends at the first kink or contact (`event_location`), and sums the series there.  `StepWriter.statements` is that list.
+The step computes the coefficients of the states up to its order, chooses its length from the last coefficients
+(`step_length`), moves its end to the first kink or contact (`event_location`), and sums the series there.
+`TaylorStepWriter.statements` lists these parts.
 """
 
 from __future__ import annotations
@@ -42,26 +43,27 @@ WORDS = frozenset(
      "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", "nearest", "loose", "closing", "side_or", "found_side", "news", "new", "floor", "value", "stuck", "side", "way", "room", *LANE_FUNCTIONS.values()}
 )  # fmt: skip
 PREFIXES = ("positive_", "i_", "e_", "half_", "w_", "n_", "size_", "odd_", "stuck_", "hint_")
-"""Names of the step; a user's symbol of that name is called otherwise within the step."""
+"""Prefixes of variables of the step; a user's symbol with such a prefix is renamed within the step."""
 
 COUNTED = re.compile(r"[rs]\d+$")
-"""Names of the step with a number: shares of `scale`, and sums."""
+"""Matches numbered variables of the step: r1, r2, … (shares of `scale`) and s1, s2, … (sums)."""
 
 ARGUMENTS = ("t", "h", "scale", "y", "p", "y_new", "dense", "rtol", "atol")
 
 SOONEST = let("nearest", 1e-13 * call("maximum", "t", 1.0) / "scale")
-"""How soon a step may end at a contact or a jump: about 450 roundings of the time, so that time goes on; a choice."""
+"""Least step to a contact or a jump: about 450 rounding errors of the time, so that time advances; a choice."""
 
 LEAST_ORDER = 6
-"""The least order: the last three orders, which decide the length of a step, lie above the low ones (`step_length.LOW`)."""
+"""The least order: its last three orders, which determine the step length, lie above the orders `step_length.LOW`."""
 
 
 @dataclass(frozen=True, slots=True)
 class TaylorStep:
-    """The function `step` and what a kernel needs to call it.
+    """The function `step`, and the data that a kernel needs to call `step`.
 
-    order: that of the series, and the number of rows of the dense output; workspace: the groups of memory behind the dense
-    output; called: the text of functions that it calls; table: the numbers that it reads in the array `where`.
+    order: order of the series, and number of rows of the dense output. workspace: number of groups of memory behind the
+    dense output. called: texts of the functions that `step` calls. table: the numbers that `step` reads from the array
+    `where`.
     """
 
     function: Function
@@ -72,7 +74,7 @@ class TaylorStep:
 
     @property
     def text(self) -> str:
-        """Return the step and what it calls, as a kernel has them."""
+        """The text of the step and of the functions that it calls, as in a kernel."""
         return "\n\n\n".join([*self.called, LANES.function(self.function)])
 
     @property
@@ -82,10 +84,10 @@ class TaylorStep:
 
 
 class TaylorStepWriter(ABC):
-    """Writes the step of some order for tidy equations.
+    """Write the step of some order for equations with names that are free in generated code (`tidy`).
 
-    `parts` are the series that it makes together; `exact` is True if the tolerance alone decides how exact loads of contacts
-    are: slip of some contact begins with a jump of acceleration.
+    `parts`: the groups of series that are computed together. `exact`: True if the slip of some contact begins with a
+    jump of acceleration; loads of contacts then need the full tolerance.
     """
 
     parts: Sequence[SeriesWriter]
@@ -98,7 +100,7 @@ class TaylorStepWriter(ABC):
         self.substitutes: dict[sp.Symbol, sp.Expr] = {real(old): real(new) for old, new in self.called.items()}
 
     def step(self, *more: str) -> TaylorStep:
-        """Return the step, which takes `more` arguments."""
+        """Return the step; the names in `more` become additional arguments."""
         body = tuple(self.statements())
         docstring = (
             "One step from (t, y): writes y_new and the dense output, returns its length and how far its series reach."
@@ -110,15 +112,15 @@ class TaylorStepWriter(ABC):
 
     def statements(self) -> list[Statement]:
         """Return the body of the step."""
-        # coefficients of all orders; while they show on which sides series lie that begin at zero, they are computed again.
-        # each turn finds one more side at least: what one jump sets off may decide the next one
+        # compute the coefficients of all orders.  if they decide the sign of a series that begins at zero, compute them
+        # again.  each turn decides at least one more sign; several turns occur because one jump may cause another
         coefficients = self.coefficients()
         if forget := [s for part in self.parts for s in part.forget_sides()]:
             find = [s for part in self.parts for s in part.find_sides()]
             body = (*coefficients, Comment("sides of what begins at zero"), let("news", 0.0 * Name("t")), *find)
             coefficients = [*forget, Repeat(body, call("any_lane", Compare(">", Name("news"), Number(0.5))))]
 
-        # the first of the passages, each of which looks no further than the one before
+        # find the first passage: each search ends at the earliest passage so far
         passages = [s for part in self.parts for s in part.passages(self.exact)]
         if passages:
             begin: list[Statement] = [Comment("first passage"), let("passed", "ratio")]
@@ -127,9 +129,9 @@ class TaylorStepWriter(ABC):
             until = Conditional(passed, Name("passed") * "scale", Name("length"))
             passages = [*begin, *passages, let("until", until), let("ratio", "passed")]
 
-        # the length by the last coefficients of states, gaps of kinks and contacts, and by what is still too small to be seen.
-        # a load that is wrong by some part frees a body too early or late, with less than the power 3/2 of it as velocity,
-        # unless friction falls at once: its tolerance is rtol**(3/4)
+        # choose the length by the last coefficients of states, of gaps of kinks and contacts, and by watched series.
+        # a relative error of a load releases a body too early or too late; the velocity error is at most the power
+        # 3/2 of the load's error unless friction drops at once, so the tolerance of loads is rtol**(3/4)
         loose = let("loose", "rtol" if self.exact else call("math.sqrt", Name("rtol") * call("math.sqrt", "rtol")))
         length = [
             Comment("step length"),
@@ -162,10 +164,10 @@ class TaylorStepWriter(ABC):
     @property
     @abstractmethod
     def workspace(self) -> int:
-        """Return the number of groups of memory that the statements need."""
+        """Number of groups of memory that the statements need."""
 
     def opening(self) -> list[Statement]:
-        """Load what the step needs beside its coefficients."""
+        """Load the values that the step needs besides the coefficients, such as parameters."""
         return []
 
     @abstractmethod
@@ -177,12 +179,12 @@ class TaylorStepWriter(ABC):
         """Compute the sizes of the last coefficients of the states."""
 
     def reach(self) -> list[Statement]:
-        """Compute how far the step may go by all sizes."""
+        """Compute `reach`, the logarithm of (step length)/scale, from all sizes."""
         return [let("reach", reach(last_orders(self.order)))]
 
     @abstractmethod
     def new_state(self) -> list[Statement]:
-        """Compute the new state and its total."""
+        """Compute the new state and the sum `total` of its entries, which is NaN if any entry is."""
 
     @abstractmethod
     def rows(self) -> list[Statement]:
@@ -196,7 +198,7 @@ def check_order(order: int) -> None:
 
 
 def called(symbols: Collection[str]) -> dict[str, str]:
-    """Return the names of symbols within the step: unchanged, unless the step needs a name itself."""
+    """Return the names of symbols within the step: unchanged, unless the step uses the same name for a variable."""
     names: dict[str, str] = {}
     for symbol in sorted(symbols):
         name = symbol

@@ -1,7 +1,8 @@
-"""A Taylor step for a small network, written out order by order, its coefficients in names.
+"""Write a Taylor step for a small network order by order, with each coefficient in a named variable.
 
-`Lines` writes the coefficients: x_3 of a state x, product0_3 of a series.  Each name is assigned once, so that the compiler
-keeps the coefficients in registers and schedules the convolutions of one order side by side.
+`Lines` writes the coefficients: x_3 is coefficient 3 of a state x, product0_3 that of a product.  Each variable is
+assigned once, so that the compiler can hold coefficients in registers and schedule the convolutions of one order in
+parallel.
 """
 
 from __future__ import annotations
@@ -34,16 +35,16 @@ from .taylor_step import TaylorStep, TaylorStepWriter, check_order
 SQUARE = let("square", Name("ratio") * "ratio")
 
 Symbols = tuple[dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]
-"""The symbols of a template that stand for series, and those that stand for constants."""
+"""Two maps for a template: from moving symbols to series, and from constant symbols to expressions."""
 
 
 @dataclass(eq=False)
 class Lines(SeriesWriter):
-    """Writes the coefficients of series one after another, each under a name.
+    """Write the coefficients of series one after another, each in a named variable.
 
-    k: the order that is written; room: the group of memory from which a passage reads coefficients; rates: the states that
-    move, and their rates; values: the coefficients so far, as names and numbers, by series and order; sizes: those of the
-    last coefficients by order, in units of their errors.
+    k: the order that is being written. room: the group of memory from which a passage reads coefficients. rates: the
+    rate of each state that moves. values: the coefficients so far, as names or numbers, by series and order. sizes: the
+    sizes of the last coefficients by order, in units of the allowed error.
     """
 
     k: int = 0
@@ -67,13 +68,13 @@ class Lines(SeriesWriter):
         return self.at(series, self.k)
 
     def sum(self, left: Series, right: Series, first: int, last: int) -> Expression:
-        # the latest coefficients come last, so that the processor adds up all others before they are known
+        # put products with the latest coefficients last: the processor adds all others while these are computed
         k = self.k
         order = sorted(range(first, k + last + 1), key=lambda j: max(j, k - j))
         return add(*(times(self.at(left, j), self.at(right, k - j)) for j in order))
 
     def square(self, base: Series, first: int) -> Expression:
-        # pairs of equal products once, twice as large, and the middle one
+        # compute each pair of equal products once, times 2, and add the middle product
         k = self.k
         half = add(*(times(self.at(base, j), self.at(base, k - j)) for j in reversed(range(first, (k + 1) // 2))))
         middle = self.at(base, k // 2) if k % 2 == 0 and k // 2 >= first else ZERO
@@ -132,7 +133,7 @@ class Lines(SeriesWriter):
         return self.at(series.argument, k)
 
     def near(self, series: Series, passages: Sequence[Statement]) -> list[Statement]:
-        # most steps come near no kink: skip the search if no lane of the series can change by as much as its value
+        # most steps are far from kinks: skip the search if in no lane the series can change by as much as its value
         start, *coefficients = self.all_of(series)
         start = absolute(start) if start != ZERO else ZERO
         near = Compare("<=", start, 1.0001 * Name("way") * Name("ratio"))
@@ -141,7 +142,7 @@ class Lines(SeriesWriter):
     # -- statements -----------------------------------------------------------------------------------------------
 
     def coefficients(self, k: int) -> None:
-        """Write coefficients k of the states and of all series; in the last order of those alone that end steps."""
+        """Write coefficients k of the states and all series; at the last order, only of series that may end a step."""
         self.k = k
         self.put(Comment(f"order {k}"), *([let(f"r{k}", times(Number(1.0 / k), Name("scale")))] if k else []))
         for state, rate in self.rates.items() if k else ():
@@ -151,11 +152,11 @@ class Lines(SeriesWriter):
 
 
 class UnrolledSeries(TaylorStepWriter):
-    """Writes everything out, with one part of all series."""
+    """Write a step without loops; all series form one part."""
 
     def __init__(self, equations: Equations, order: int) -> None:
         super().__init__(equations, order, {*equations.state, *equations.parameters})
-        # names of states of which no coefficient is called like a symbol
+        # rename states so that no coefficient has the name of a symbol
         taken = {*self.called, *self.called.values()}
         self.names = []
         for state in equations.state:
@@ -168,7 +169,7 @@ class UnrolledSeries(TaylorStepWriter):
         self.supply = Names([*taken, *self.names, *symbols])
         self.lines = Lines(SeriesGraph(self.supply), order, room=order * equations.dimension)
         self.graph, self.parts = self.lines.graph, [self.lines]
-        # states that move are series, the others, such as modes of contacts, are constants
+        # states that move are series; all other states, such as modes of contacts, are constants
         edges = [[edge for link, edge in equations.linked() if link[0] == i] for i in range(equations.n)]
         moves = (compress(slots, moving(equations.node_at(i), edges[i])) for i, slots in enumerate(equations.places))
         periods = periods_of_states(equations)
@@ -177,7 +178,7 @@ class UnrolledSeries(TaylorStepWriter):
         }
         still = {slot: Constant(Name(self.called[name])) for slot, name in enumerate(equations.state)}
         self.states: list[Series] = list((still | self.moving).values())
-        # the series of the rates, of the gaps of contacts, and of what a subclass needs besides
+        # make the series of the rates, of the gaps of contacts, and of expressions that a subclass adds (`noted`)
         self.noted: list[Series] = []
         self.lines.rates, self.lines.contacts = self.read(), list(self.contacts())
         gaps = [s for gaps in self.lines.contacts for s in gaps.series]
@@ -186,7 +187,7 @@ class UnrolledSeries(TaylorStepWriter):
     # -- series -----------------------------------------------------------------------------------------------
 
     def read(self) -> dict[State, Series]:
-        """Return the rates of the states that move: those of the nodes, and what each link adds, solved for by M."""
+        """Return the rates of the states that move: add up terms of nodes and links, then solve with the masses M."""
         places = self.equations.places
         terms = defaultdict[int, list[tuple[Expression, Series]]](list)
         for (target, *_), rates in self.contributions(lambda node: node.rhs, lambda edge: edge.rhs, {TIME: self.time}):
@@ -208,7 +209,7 @@ class UnrolledSeries(TaylorStepWriter):
         of_edge: Callable[[Edge], Sequence[sp.Expr]],
         time: dict[sp.Symbol, Series],
     ) -> Iterator[tuple[tuple[int, ...], list[Series]]]:
-        """Yield what each node and each link contributes as series, with the node, or the target and the source."""
+        """Yield the series that each node and each link contributes, with (node,) or (target, source)."""
         eq, shared = self.equations, self.supply.fresh("shared_")
         nodes = [Template.of(of_node(node), (*time, *node.state), shared) for node in eq.nodes]
         edges = {edge: Template.of(of_edge(edge), (*time, *edge.here, *edge.there), shared) for edge in eq.edges}
@@ -229,11 +230,11 @@ class UnrolledSeries(TaylorStepWriter):
                 yield Gaps(name, f"stuck_{name}", (rise, fall), sizes, (Name(sizes[0]), Name(sizes[1])), room)
 
     def of_network(self) -> Symbols:
-        """Return what the symbols of the whole network stand for."""
+        """Return the series, or the constants, for the symbols of the whole network."""
         return self.symbols({TIME: self.time}, {s: s for s in map(real, self.equations.state)})
 
     def symbols(self, time: dict[sp.Symbol, Series], values: Mapping[sp.Symbol, sp.Expr]) -> Symbols:
-        """Return what the symbols of a template stand for, from their values in symbols of the network."""
+        """Return the series, or the constants, for the symbols of a template; `values` maps them to the network's."""
         slots = {s: slot for slot, s in enumerate(map(real, self.equations.state))}
         moving, constant = dict(time), dict(self.substitutes)
         for s, e in values.items():
@@ -247,7 +248,7 @@ class UnrolledSeries(TaylorStepWriter):
 
     @property
     def workspace(self) -> int:
-        # the coefficients of one kink, or those of both gaps of a contact and room for one of them
+        # memory for the coefficients of one kink; or of both gaps of a contact, and a copy of one gap
         return (self.order + 1) * (3 if self.equations.sticks else 1 if self.graph.kinks else 0)
 
     def coefficients(self) -> list[Statement]:
@@ -263,7 +264,7 @@ class UnrolledSeries(TaylorStepWriter):
         return lines.statements
 
     def make(self, k: int) -> None:
-        """Write coefficients k of all series, and behind order 0 the sizes of the terms of gaps."""
+        """Write coefficients k of all series, and after order 0 the sizes of the terms of gaps."""
         self.lines.coefficients(k)
         for gaps in self.lines.contacts if k == 0 else ():
             for name, series in zip(gaps.names, gaps.series, strict=True):
@@ -275,7 +276,7 @@ class UnrolledSeries(TaylorStepWriter):
     def reach(self) -> list[Statement]:
         orders = [k for k in last_orders(self.order) if self.lines.sizes[k]]
         statements = [let(f"size_{k}", largest(self.lines.sizes[k])) for k in orders]
-        # infinitely far if no coefficient limits the step
+        # if no coefficient limits the step, the logarithm is infinite: -log(0)
         statements.append(let("reach", reach(orders) if orders else Negation(call("log", 0.0 * Name("scale")))))
         return [*statements, *([SEEN] if self.watching else []), *self.lines.watches()]
 
@@ -298,9 +299,10 @@ class UnrolledSeries(TaylorStepWriter):
 
 
 def polynomial(name: str, coefficients: Sequence[Expression]) -> list[Statement]:
-    """Return the statements for n_<name>, the polynomial of some coefficients in `ratio`.
+    """Return the statements that assign the polynomial with these coefficients in `ratio` to n_<name>.
 
-    Its odd and its even part, two Horner schemes in ratio**2 of half the degree, are ready sooner than one scheme.
+    The odd and the even part are two Horner schemes in ratio**2.  Each has half the degree, so that the two together
+    have a shorter latency than one scheme.
     """
     statements, values = list[Statement](), list[Expression]()
     start, *others = coefficients
@@ -319,7 +321,7 @@ def polynomial(name: str, coefficients: Sequence[Expression]) -> list[Statement]
 
 
 def _masses_of_node(node: Node) -> list[sp.Expr]:
-    """Return the entries of M of one node, those of the identity if it has no mass matrix."""
+    """Return the entries of M of one node; those of the identity if the node has no mass matrix."""
     return [e for row in node.inertia or sp.eye(len(node.state)).tolist() for e in row]
 
 
@@ -328,7 +330,7 @@ def _masses_of_link(edge: Edge) -> list[sp.Expr]:
 
 
 def write_step(equations: Equations, order: int) -> TaylorStep:
-    """Return the Taylor step of some order for equations with names that a kernel can use (`tidy`)."""
+    """Return the Taylor step of this order for equations with names that a kernel can use (`tidy`)."""
     check_order(order)
     check_passable(equations)
     return UnrolledSeries(equations, order).step()
