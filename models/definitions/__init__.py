@@ -1,1 +1,1 @@
-"""How a model is defined: expressions of a notebook or a plug-in file, tables of a scene file. All make the same values."""
+"""Define models by expressions (notebooks, plug-in files) or by tables (scene files); both make the same values."""

@@ -1,4 +1,4 @@
-"""The kinds of plug-in of mechanics.  Lists of plug-ins need no SymPy: the types of the values are imported on a call."""
+"""The kinds of plug-in of mechanics.  The types of the values are imported on use, so that lists need no SymPy."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""Oscillators, friction laws and couplings from expressions in SymPy or text: for notebooks, scene files and plug-in files.
+"""Define oscillators, friction laws and couplings by expressions in SymPy or text, in notebooks and files.
 
-States are functions of time or plain symbols, the time is any symbol called t, decimals are exact: 0.1 is 1/10.  Symbols of
-one name are one quantity, real whatever was assumed; a parameter that was assumed positive or nonnegative has that range.
+States are functions of time or plain symbols.  Time is any symbol called t.  Decimals are exact: 0.1 is 1/10.  Symbols
+with the same name are the same quantity, which is real regardless of the assumptions of the symbol.  A parameter whose
+symbol is assumed positive or nonnegative gets that range.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from ..mechanics.parameter import Parameter, dimension
 from .loader import load_friction_law
 
 Expression: TypeAlias = "sp.Expr | float | str"
-"""An expression of SymPy, a number, or text that is parsed and not run."""
+"""An expression of SymPy, a number, or a text, which is parsed, not run."""
 
 LONGEST_SOURCE = 4096
 """Most characters of a citation, a choice."""
@@ -70,46 +71,48 @@ def Lagrangian(
     T, V : Expr, number or str
         Kinetic and potential energy.  A text is parsed, not run: ``"k*x**2/2"``.
     Q : mapping, optional
-        The generalised force on each coordinate, 0 for those left out.  ``friction(velocity)`` in it is the friction
-        coefficient at a sliding velocity.
+        Coordinate -> generalised force, 0 for coordinates left out.  In a force, ``friction(velocity)`` stands for
+        the friction coefficient at a sliding velocity.
     R : Expr, number or str
-        Rayleigh's function, half the power lost; its negative derivatives by the velocities are added to the forces.
+        Rayleigh's dissipation function, half the dissipated power.  Its negative derivatives with respect to the
+        velocities are added to the forces.
     coordinates : iterable or mapping, optional
-        The coordinates in their order, or each with the name of its velocity: ``{x: v}``.  Left out, they are the
-        functions of time in the expressions, sorted by name.  Velocities are derivatives of such functions; as states
-        and in text they are called v if there is one coordinate, v_x and v_y if there are several, unless said
-        otherwise.  Coordinates that are plain symbols must be given.
+        The coordinates in order, or a mapping from coordinates to names of velocities: ``{x: v}``.  By default the
+        coordinates are the functions of time in the expressions, sorted by name.  Coordinates that are plain symbols
+        must be given.  In SymPy a velocity is the derivative of a coordinate.  As a state and in text a velocity is
+        called v if there is one coordinate, else v_x, v_y, …, unless the mapping gives another name.
     friction : str, FrictionLaw or Expr, optional
-        The friction law: its name, its value, or the friction coefficient as an expression of SymPy of the sliding
-        velocity ``w`` and of parameters that occur nowhere else; `friction_law` reads one from text.  A scene may name
-        another.
+        The friction law: the name of a law, a `FrictionLaw`, or the friction coefficient as a SymPy expression of the
+        sliding velocity ``w`` and of parameters that occur nowhere else.  `friction_law` makes a law from text.  A
+        scene may replace the law.
     contact : str, optional
-        How the jump of the law at rest is treated: "atan" (the default), "sign" or "set-valued".  A law without a
+        Treatment of the law's jump at zero velocity: "atan" (the default), "sign" or "set-valued".  A law without a
         jump never sticks.
     parameters : mapping, optional
         The default of each parameter: a number, or a `Parameter` with its range.
     initial : mapping, optional
         The state around which oscillators start, 0 for the states left out.
     scaling : mapping, optional
-        Keyed if the Lagrangian is in physical quantities, from which the non-dimensional equations are derived.
-        ``units`` has the SI unit of each constant, such as ``{"m": "kg", "k": "N/m"}``, and of each coordinate with a
-        unit; ``scales`` the units of mass, length and time made of the constants, ``{"kg": "m", "m": …, "s":
-        "sqrt(m/k)"}``; ``physical`` the name in the expressions of each parameter that has another name there.
+        Needed for a Lagrangian in physical quantities; the non-dimensional equations are derived from it.  The
+        mapping has up to three keys.  ``units`` maps each constant, and each coordinate with a unit, to its SI unit:
+        ``{"m": "kg", "k": "N/m"}``.  ``scales`` maps the units of mass, length and time to expressions of the
+        constants: ``{"kg": "m", "m": …, "s": "sqrt(m/k)"}``.  ``physical`` maps parameters to their names in the
+        expressions, if the names differ.
     source : str
-        Where the model was published.
+        Publication of the model.
     name : str
         Name in messages and scene files.
 
     Returns
     -------
     Oscillator
-        The oscillator; its states are its attributes, ``node.x``.
+        The oscillator.  Its states are attributes, such as ``node.x``.
 
     Raises
     ------
     ValueError, TypeError
-        For undeclared symbols, unused parameters, functions that generated code does not know, numbers that are not
-        finite and real, unknown coordinates, two meanings of one name, and a velocity without kinetic energy.
+        For undeclared symbols, unused parameters, functions that generated code does not have, numbers that are not
+        finite and real, unknown coordinates, a name with two meanings, and a velocity without kinetic energy.
 
     Examples
     --------
@@ -140,14 +143,14 @@ def Lagrangian(
     acting = tuple(names.expression(f"force on {c}", on.get(c, 0)) for c in table)
     speeds = [sp.Symbol(speed, real=True) for speed in table.values()]
     _try(what, lambda: check_masses_exist(mass_matrix(kinetic - potential, speeds), speeds))
-    # Friction: a law or a contact needs a force with friction(…).
+    # A law or a contact requires a force that contains friction(…).
     law = _law(what, friction, defaults)
     rubs = any(force.has(FRICTION) for force in acting)
     for keyword, value in (("friction", law), ("contact", contact)):
         if value is not None and not rubs:
             raise ValueError(f"{what}: found {keyword} {str(value)!r}, but no force has friction(…); leave it out")
     treatment = ContactModel.ATAN if contact is None else ContactModel.parse("contact", contact)
-    # A law that was written as an expression takes its parameters along.
+    # The parameters of a law given as an expression belong to the law, not to the oscillator.
     written = law if isinstance(friction, sp.Expr | int | float) else None
     node_parameters = names.used_parameters((*energies, *acting), written)
     if scales is not None:
@@ -177,21 +180,21 @@ def Field(
     Parameters
     ----------
     rates : mapping
-        The rate of each state, in the order of the states: plain symbols, functions of time, or names.  Rates are
-        expressions of SymPy, numbers, or text that is parsed, not run.
+        State -> rate, in the order of the states.  States are plain symbols, functions of time, or names.  Rates are
+        expressions of SymPy, numbers, or texts, which are parsed, not run.
     parameters : mapping, optional
         The default of each parameter: a number, or a `Parameter` with its range.
     initial : mapping, optional
         The state around which oscillators start, 0 for the states left out.
     source : str
-        Where the model was published.
+        Publication of the model.
     name : str
         Name in messages and scene files.
 
     Returns
     -------
     Oscillator
-        The oscillator; its states are its attributes, ``node.x``.
+        The oscillator.  Its states are attributes, such as ``node.x``.
 
     Raises
     ------
@@ -243,18 +246,18 @@ def friction_law(
     Parameters
     ----------
     force : Expr, number or str
-        Friction force over normal load, of the velocity w of the ground relative to the body; w f(w) >= 0.  A jump
-        at w = 0 is written with sign(w), and refused if it is not.
+        Friction force divided by normal load, as a function f of the velocity w of the ground relative to the body,
+        with w f(w) >= 0.  A jump at w = 0 must be written with sign(w).
     parameters : mapping, optional
         The default of each parameter.  If none has a unit, w is the non-dimensional velocity.
     static : Expr, number or str, optional
-        The static friction coefficient if it exceeds f(0+); for set-valued contact alone.
+        The static friction coefficient, if it exceeds f(0+).  Used by set-valued contact only.
     order : iterable of (str, str)
-        Pairs of parameters of which the first must not exceed the second under set-valued contact.
+        Pairs of parameters (p, q) that must satisfy p <= q under set-valued contact.
     self_exciting : bool
-        True if the law is meant to feed energy.
+        True if the law may feed energy into the oscillator.
     source : str
-        Where the law was published.
+        Publication of the law.
     name : str
         Name in messages and scene files.
 
@@ -302,36 +305,39 @@ def link_energy(
     source: str = "",
     name: str = "coupling",
 ) -> LagrangianCoupling:
-    """Return the coupling of the energies of a link between equal coordinates of its two ends, whatever these are called.
+    """Return the coupling given by energies of a link between corresponding coordinates of the two ends.
+
+    The coordinates may have any names.
 
     Parameters
     ----------
     V : Expr, number or str
         The potential energy of a link of weight ``W`` between the coordinates ``q_i`` and ``q_j`` of its ends; as text,
-        ``"k*W*(q_i - q_j)**2/2"``.  Written in the difference, equal states feel exactly nothing.  Where exchanging i
-        and j changes an energy, links have a direction and the weight 1.
+        ``"k*W*(q_i - q_j)**2/2"``.  An energy of the difference q_i - q_j exerts exactly no force on equal states.
+        If exchanging i and j changes an energy, links have a direction and the weight 1.
     R : Expr, number or str
-        Rayleigh's function of the velocities ``v_i`` and ``v_j``, half the power lost.
+        Rayleigh's dissipation function of the velocities ``v_i`` and ``v_j``, half the dissipated power.
     T : Expr, number or str
-        The kinetic energy of a link in ``v_i`` and ``v_j``, which gives it inertia.
+        The kinetic energy of a link, a function of ``v_i`` and ``v_j``, if the link has inertia.
     parameters : mapping, optional
         The default of each parameter: a number, or a `Parameter` with its range.
     between : mapping, optional
-        Two oscillators by name, each with those of its states that the energies contain, in place of the ends above.
+        Links between two kinds of oscillators: maps the names of both to the states that the energies contain, in
+        place of ``q_i``, ``q_j``, ``v_i`` and ``v_j``.
     source : str
-        Where the coupling was published.
+        Publication of the coupling.
     name : str
         Name in messages and scene files.
 
     Returns
     -------
     LagrangianCoupling
-        The coupling; `Potential` and `Rates` make those of given states.
+        The coupling.  For couplings of particular states use `Potential` and `Rates`.
 
     Raises
     ------
     ValueError, TypeError
-        As `Lagrangian` does, and for energies without the weight of the link.
+        As `Lagrangian` does, and if no energy contains the weight of the link.
 
     Examples
     --------
@@ -342,7 +348,7 @@ def link_energy(
     """
     what = f"coupling {_called(name)!r}"
     defaults = _parameters(what, parameters)
-    # The ends in the energies: coordinates and velocities of any oscillator, or the states of two given ones.
+    # Symbols of the ends: coordinates and velocities of any oscillator, or the states of two given oscillators.
     kinds: tuple[str, str] | None = None
     ends = {"V": ["q_i", "q_j"], "R": ["v_i", "v_j"], "T": ["v_i", "v_j"]}
     if between is not None:
@@ -373,7 +379,7 @@ def link_energy(
 
 
 def _called(name: object) -> str:
-    """The name of a model: a short text, and no path of a file of code."""
+    """Check the name of a model: a short text that is no path of a plug-in file."""
     text = check_text("name", name)
     if text.endswith(".py"):
         raise ValueError(f"name: found {text!r}, which names a file of code; expected another name")
@@ -385,16 +391,16 @@ def _called(name: object) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _ModelNames:
-    """The symbols of the names in the expressions of one model."""
+    """Map names to symbols, and convert expressions, for one model."""
 
-    what: str  # the model in messages
+    what: str  # name of the model in messages
     symbols: Mapping[str, sp.Symbol]
     states: tuple[str, ...] = ()
-    # functions of time and their derivatives -> the symbols that take their places; a plain symbol of the same name is
-    # refused, since SymPy's derivatives would not have seen it
+    # function of time or derivative of one -> symbol that replaces it; a plain symbol of the same name is refused,
+    # because SymPy's derivative by time treated that symbol as constant
     moving: Mapping[sp.Expr, sp.Symbol] = field(default_factory=dict)
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
-    # parameter -> its name in the expressions; parameters left out have one name
+    # parameter -> name in the expressions, if the two names differ
     physical: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
@@ -406,10 +412,10 @@ class _ModelNames:
         parameters: Mapping[str, Parameter],
         scaling: Scaling | None = None,
     ) -> _ModelNames:
-        """The names of a model: coordinates with the names of their velocities ("" for none), and quantities."""
+        """Make the names of a model; `coordinates` maps coordinates to names of velocities ("" for none)."""
         states = (*table, *filter(None, table.values()))
         physical: Mapping[str, str] = {} if scaling is None else scaling.physical
-        # The constants that fix the scales are positive, so that SymPy takes roots of their products apart.
+        # Constants that define the scales are positive, so that SymPy splits roots of their products.
         quantities = {} if scaling is None else {name: sp.Symbol(name, positive=True) for name in scaling.units}
         for name in (physical.get(name, name) for name in parameters):
             if name in quantities:
@@ -436,7 +442,7 @@ class _ModelNames:
 
     @classmethod
     def of_law(cls, what: str, parameters: Mapping[str, Parameter]) -> _ModelNames:
-        """The names of a friction law: the sliding velocity and parameters."""
+        """Make the names of a friction law: sliding velocity and parameters."""
         if SLIDING.name in parameters:
             raise ValueError(f"{what}: the name 'w' stands for the sliding velocity; rename that parameter")
         symbols = {name: sp.Symbol(name, real=True) for name in parameters}
@@ -444,7 +450,7 @@ class _ModelNames:
 
     @classmethod
     def of_link(cls, what: str, states: Iterable[str], parameters: Mapping[str, Parameter]) -> _ModelNames:
-        """The names of the energy of a link: states of its ends, its weight under two names, and parameters."""
+        """Make the names of a link's energies: states of the ends, the weight under two names, parameters."""
         weights = {"W": WEIGHT, WEIGHT.name: WEIGHT}
         clash = next((name for name in (*states, *weights) if name in parameters), None)
         if clash is not None:
@@ -453,7 +459,7 @@ class _ModelNames:
         return cls(what, {**symbols, **weights}, parameters=parameters)
 
     def expression(self, about: str, value: object) -> sp.Expr:
-        """The expression of a user in the form that a model keeps."""
+        """Convert the user's expression to the form that a model stores."""
         about = f"{self.what}: {about}"
         if not isinstance(value, sp.Expr):
             return exact(about, value, self.symbols)
@@ -471,7 +477,7 @@ class _ModelNames:
         return exact(about, value.xreplace(self.moving), self.symbols)
 
     def state(self, about: str, key: object, known: Collection[str]) -> str:
-        """The name of a state out of some that is a key of a mapping."""
+        """Convert a key of a mapping to the name of a state; ValueError unless the name is in `known`."""
         symbol = self.moving.get(key)
         name = symbol.name if symbol is not None else _name(self.what, about, key)
         if name not in known:
@@ -480,7 +486,7 @@ class _ModelNames:
         return name
 
     def initial(self, value: Keyed | None) -> FrozenDict[float] | None:
-        """The state around which oscillators start."""
+        """Check the state around which oscillators start."""
         if value is None:
             return None
         table = check_table(f"{self.what}: initial", value)
@@ -489,7 +495,7 @@ class _ModelNames:
         )
 
     def used_parameters(self, expressions: Iterable[sp.Expr], law: FrictionLaw | None = None) -> FrozenDict[Parameter]:
-        """The parameters without those of a law written among them; ValueError if one is unused, or used in both."""
+        """Return the parameters outside the law; ValueError if one is unused, or used inside and outside the law."""
         symbols = {s.name for e in expressions for s in e.free_symbols}
         of_law = frozenset(() if law is None else law.parameters)
         for name in self.parameters:
@@ -505,7 +511,7 @@ class _ModelNames:
 
 
 def _functions(what: str, values: Iterable[object]) -> list[AppliedUndef]:
-    """The functions of time in some expressions, sorted by name."""
+    """Collect the functions of time in expressions, sorted by name."""
     functions = {f for value in values if isinstance(value, sp.Expr) for f in value.atoms(AppliedUndef)}
     moving = sorted((f for f in functions if f.func != FRICTION), key=str)
     for function in moving:
@@ -515,7 +521,7 @@ def _functions(what: str, values: Iterable[object]) -> list[AppliedUndef]:
 
 
 def _coordinates(what: str, value: object, moving: Iterable[AppliedUndef]) -> Mapping[str, str]:
-    """Each coordinate with the name of its velocity."""
+    """Map each coordinate to the name of its velocity."""
     if value is None:
         value = list(dict.fromkeys(function.func.__name__ for function in moving))
         if not value:
@@ -541,7 +547,7 @@ def _distinct(what: str, role: str, table: dict[str, str], count: int) -> dict[s
 
 
 def _name(what: str, role: str, key: object) -> str:
-    """The name of a symbol, a function of time or a text, as a name that all texts can have."""
+    """Return the name of a symbol, a function of time or a text; ValueError if text cannot contain that name."""
     name = key.func.__name__ if isinstance(key, AppliedUndef) else getattr(key, "name", key)
     if not isinstance(name, str):
         raise TypeError(
@@ -567,7 +573,7 @@ def _name(what: str, role: str, key: object) -> str:
 def _scaling(
     what: str, table: object, coordinates: Mapping[str, str], parameters: Iterable[str]
 ) -> tuple[Scaling, dict[str, str]]:
-    """The scaling of a table, and the units of all quantities that are no parameters."""
+    """Read a scaling from a table; also return the units of all quantities that are not parameters."""
     what = f"{what}: scaling"
     entries = check_table(what, table)
     check_keys(what, entries, ("units", "scales", "physical"))
@@ -577,11 +583,11 @@ def _scaling(
         units[name] = check_text(f"{what}: unit of {name}", unit)
         _try(f"{what}: {name}", lambda unit=unit: dimension(unit))
     constants = {name: unit for name, unit in units.items() if name not in coordinates}
-    # Parameters have another name in the expressions, or the same.
+    # Map each parameter to its name in the expressions.
     renamed = check_table(f"{what}: physical", entries.get("physical", {}))
     check_keys(f"{what}: physical", renamed, parameters)
     physical = {name: _name(what, "quantity", renamed.get(name, name)) for name in parameters}
-    # The units of mass, length and time are made of the constants.
+    # Read the units of mass, length and time as expressions of the constants.
     scales = check_table(f"{what}: scales", entries.get("scales", {}))
     if set(scales) != {"kg", "m", "s"}:
         keys = ", ".join(map(repr, scales)) or "nothing"
@@ -592,7 +598,7 @@ def _scaling(
 
 
 def _parameters(what: str, parameters: Keyed | None) -> dict[str, Parameter]:
-    """Name -> Parameter, with the range that a symbol was assumed to have."""
+    """Map names to parameters; assumptions of a symbol (positive, nonnegative) become the range."""
     table: dict[str, Parameter] = {}
     for key, value in check_table(f"{what}: parameters", {} if parameters is None else parameters).items():
         name = _name(what, "parameter", key)
@@ -611,7 +617,7 @@ def _parameter(value: object) -> Parameter:
 
 
 def _value(what: str, value: object) -> float:
-    """A finite number; constants of SymPy and fractions are numbers too."""
+    """Convert a number, a fraction or a constant of SymPy to a finite float."""
     if isinstance(value, sp.Expr) and value.is_number and value.is_real:
         return check_number(what, float(value))
     return check_number(what, float(value) if isinstance(value, Fraction) else value)
@@ -623,7 +629,7 @@ _NONNEGATIVE = sp.Symbol("x", nonnegative=True).assumptions0
 
 
 def _assumed(key: object, parameter: Parameter) -> Parameter:
-    """A parameter with the range of the assumptions of its symbol; ValueError if no range says the same."""
+    """Give a parameter the range assumed for its symbol; ValueError if no range expresses an assumption."""
     facts = key.assumptions0 if isinstance(key, sp.Symbol) else _REAL
     if facts.items() <= _REAL.items():
         return parameter
@@ -636,7 +642,7 @@ def _assumed(key: object, parameter: Parameter) -> Parameter:
 
 
 def _law(what: str, value: object, defaults: Mapping[str, Parameter]) -> FrictionLaw | None:
-    """The friction law of a name, a value, or an expression of the sliding velocity and some of the parameters."""
+    """Make a friction law from a name, a FrictionLaw, or an expression of the sliding velocity and parameters."""
     if value is None or isinstance(value, FrictionLaw):
         return value
     if isinstance(value, str):
@@ -650,7 +656,7 @@ def _law(what: str, value: object, defaults: Mapping[str, Parameter]) -> Frictio
 
 
 def _try(what: str, action: Any) -> Any:
-    """What an action returns; its errors begin with `what`."""
+    """Call `action` and return its result; prefix its error messages with `what`."""
     try:
         return action()
     except (ValueError, TypeError) as error:

@@ -1,4 +1,4 @@
-"""Oscillators, friction laws and couplings by name."""
+"""Load oscillators, friction laws and couplings by name."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def load_friction_law(name: str) -> FrictionLaw:
 
 
 def read_coupling(text: str) -> Coupling:
-    """Return the coupling of a text: components such as "x->x", or a plug-in, on some coordinates as in "spring on x"."""
+    """Read a coupling: components such as "x->x", or a plug-in with optional coordinates such as "spring on x"."""
     matrix = MatrixCoupling.parse(text)
     if matrix is not None:
         return matrix

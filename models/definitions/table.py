@@ -1,4 +1,4 @@
-"""Oscillators, friction laws and couplings as tables of text and numbers, the form of scene files and results, and back."""
+"""Convert oscillators, friction laws and couplings to and from tables of text and numbers, as in scene files."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _ENERGIES = ("potential", "dissipation", "kinetic")
 
 
 def oscillator_of_table(table: Mapping[object, Any]) -> Oscillator:
-    """Return the oscillator of a table in a scene file."""
+    """Make an oscillator from a table of a scene file."""
     first_order = "rates" in table
     check_keys("oscillator", table, _FIELD if first_order else _LAGRANGIAN)
     keywords = {str(key): value for key, value in table.items()}
@@ -57,7 +57,7 @@ def oscillator_of_table(table: Mapping[object, Any]) -> Oscillator:
 
 
 def law_of_table(table: Mapping[object, Any]) -> FrictionLaw:
-    """Return the friction law of a table in a scene file."""
+    """Make a friction law from a table of a scene file."""
     check_keys("friction", table, _LAW)
     keywords = {str(key): value for key, value in table.items()}
     if "force" not in keywords:
@@ -76,7 +76,7 @@ def law_of_table(table: Mapping[object, Any]) -> FrictionLaw:
 
 
 def coupling_of_table(table: Mapping[object, Any]) -> Coupling:
-    """Return the coupling of a table in a scene file: energies of equal coordinates, rates or a potential of given states."""
+    """Make a coupling from a table of a scene file: energies of coordinates, or rates or a potential of states."""
     if "energies" not in table:
         return from_table("coupling", table)
     check_keys("coupling", table, _LINK)
@@ -98,7 +98,7 @@ def _is_pair(value: object) -> bool:
 
 
 def _law(value: object) -> FrictionLaw | None:
-    """The law of a table or a name; an expression needs the table."""
+    """Make a friction law from a table or a name; a bare expression is refused."""
     if value is None or isinstance(value, Mapping):
         return None if value is None else law_of_table(value)
     name = check_text("oscillator: friction", value, 4096)
@@ -106,7 +106,7 @@ def _law(value: object) -> FrictionLaw | None:
 
 
 def _text(what: str, value: object) -> Any:
-    """An expression of a file: text, or a number."""
+    """Check an expression of a file: a text or a number."""
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise TypeError(f"{what}: found {typed_repr(value)}; expected an expression in quotation marks")
     return value
@@ -122,7 +122,7 @@ def _texts(what: str, table: object) -> dict[str, Any]:
 def as_name_or_table(part: Oscillator | FrictionLaw) -> str | dict[str, Any]:
     """Return the name of an oscillator or friction law that a plug-in defines, else its table.
 
-    A file outside the package is a plug-in too, named by its path.
+    A file outside the package is a plug-in named by its path.
     """
     if part.name.endswith(".py"):
         return str(part.name)
@@ -137,7 +137,7 @@ def as_name_or_table(part: Oscillator | FrictionLaw) -> str | dict[str, Any]:
 
 
 def as_text_or_table(coupling: Coupling | None) -> str | dict[str, Any]:
-    """Return the text of a coupling by components or of a plug-in, else its table; "none" for None."""
+    """Return the text of a coupling made from components or by a plug-in, else its table; "none" for None."""
     if coupling is None or isinstance(coupling, MatrixCoupling):
         return "none" if coupling is None else str(coupling)
     if not isinstance(coupling, LagrangianCoupling):
@@ -212,7 +212,7 @@ def _link_table(coupling: LagrangianCoupling) -> dict[str, Any]:
         )
     texts = _Texts(what, ("q_i", "q_j", "v_i", "v_j", "W", *coupling.parameters))
     energies = zip(_ENERGIES, (coupling.potential, coupling.dissipation, coupling.kinetic), strict=True)
-    weight = {WEIGHT: texts.names["W"]}  # the name of the weight in texts
+    weight = {WEIGHT: texts.names["W"]}  # in texts the weight is called W
     table: dict[str, Any] = {
         **_names(coupling),
         "energies": {key: texts.write(e.xreplace(weight)) for key, e in energies if e != 0},
@@ -223,17 +223,17 @@ def _link_table(coupling: LagrangianCoupling) -> dict[str, Any]:
 
 
 def _names(part: Oscillator | FrictionLaw | LagrangianCoupling) -> dict[str, Any]:
-    """The name of a part, and where it was published if that is known."""
+    """Return name and source of an oscillator, law or coupling; leave out an unknown source."""
     return {"name": part.name, **({"source": part.source} if part.source else {})}
 
 
 class _Texts:
-    """Writes the expressions of one part as text that is read as the same expressions."""
+    """Write the expressions of an oscillator, law or coupling as text; reading the text gives equal expressions."""
 
     def __init__(self, what: str, names: Sequence[str], scaling: Scaling | None = None) -> None:
         self.what = what
         self.names = {name: sp.Symbol(name, real=True) for name in names}
-        if scaling is not None:  # physical names of parameters are real, the constants that fix the scales positive
+        if scaling is not None:  # physical parameters are real, constants of the scales positive
             self.names |= {name: sp.Symbol(name, real=True) for name in scaling.physical.values()}
             self.names |= {name: sp.Symbol(name, positive=True) for name in scaling.units}
 
@@ -251,7 +251,7 @@ def _parameter_tables(parameters: Mapping[str, Parameter]) -> dict[str, Any]:
 
 
 def _parameter_table(parameter: Parameter) -> float | dict[str, Any]:
-    """The default alone, or all fields that differ from their defaults."""
+    """Return the default value alone, or a table of the fields that differ from their defaults."""
     entries = {
         field.name: getattr(parameter, field.name)
         for field in fields(Parameter)
