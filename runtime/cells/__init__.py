@@ -1,7 +1,7 @@
-"""From a scene to the arrays that a kernel reads and fills: reduction, rows of cells, buffers.
+"""Convert a scene to the arrays that a kernel reads and fills: reduction, rows of cells, buffers.
 
 * cell: one simulation of a sweep
-* row: the numbers of a cell that a kernel takes
+* row: the numbers that a kernel reads for one cell
 * span: the times of a cell
 * block: cells that are run, stored and resumed together
 """

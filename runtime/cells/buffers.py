@@ -1,4 +1,4 @@
-"""The arrays that a kernel fills, cell by cell."""
+"""Define the arrays that a kernel fills, cell by cell."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from synchain.codegen.driver.columns import COUNTS, TOLERANCES, Count, PointColu
 from ..support.status import Status
 
 IN_MEMORY = 10**9
-"""Numbers of the largest result in memory, 8 GB: a choice."""
+"""Size of the largest result in memory, in numbers (8 GB): a choice."""
 
 
 def numbers_of_a_cell(dimension: int, room: int, samples: int, observed: int = 0, point_size: int | None = None) -> int:
@@ -28,18 +28,22 @@ class Buffers:
     # (cells, len(SumColumn) + observed): synchronisation errors, the time at which each cell stopped, observables
     sums: np.ndarray
     counts: np.ndarray  # (cells, COUNTS): status, steps, numbers of section points, and tolerances
-    # (cells, room, 1 + point_size): time and state of the section points, or time, number of the section and its kept values;
-    # NaN if a cell has fewer
+    # (cells, room, 1 + point_size): time and state of each section point, or time, number of the section and the values
+    # that
+    # the section keeps; NaN after the last point of a cell
     points: np.ndarray
     samples: np.ndarray  # (cells, samples, dimension): states at equally spaced times of the window
-    # (cells, any): the lanes of cells that paused or whose steps underflow; empty if no cell continues from there
+    # (cells, any): lanes of cells that paused or have steps that underflow; empty if no cell continues
     lanes: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
 
     @classmethod
     def empty(
         cls, cells: int, dimension: int, room: int, samples: int, observed: int = 0, point_size: int | None = None
     ) -> Buffers:
-        """Return buffers of cells that have not run, NaN and counts of 0; a section point has `point_size` numbers (dimension)."""
+        """Return buffers of cells that have not run, filled with NaN and counts of 0.
+
+        `point_size`: numbers of a section point; by default the dimension.
+        """
         point_size = dimension if point_size is None else point_size
         return cls(
             end=np.full((cells, dimension), np.nan),
@@ -82,7 +86,7 @@ class Buffers:
 
     @property
     def ended(self) -> bool:
-        """True if every cell came to its end, good or bad; False if one did not run or was interrupted."""
+        """True if every cell has ended, even with an error; False if a cell did not run or was interrupted."""
         return not bool(np.isin(self.status, (Status.NOT_RUN, Status.INTERRUPTED)).any())
 
     @property
@@ -92,11 +96,11 @@ class Buffers:
 
     @property
     def most_points(self) -> int:
-        """Number of section points of the cell that has most."""
+        """Largest number of section points of a cell."""
         return int(self.point_counts.max(initial=0))
 
     def widen(self, room: int) -> None:
-        """Make room for `room` section points of each cell, if there is less."""
+        """Enlarge the buffers to `room` section points of each cell, if they are smaller."""
         old = self.points.shape[1]
         if room > old:
             points = np.full((len(self.points), room, self.points.shape[2]), np.nan)
@@ -104,7 +108,7 @@ class Buffers:
             self.points = points
 
     def put(self, cells: np.ndarray, part: Buffers) -> None:
-        """Copy the rows of `part` into the rows `cells`, with more room for section points if necessary."""
+        """Copy the rows of `part` into the rows `cells`; enlarge the buffers of section points if necessary."""
         self.widen(part.points.shape[1])
         self.points[cells, : part.points.shape[1]] = part.points
         self.end[cells], self.sums[cells] = part.end, part.sums

@@ -1,4 +1,4 @@
-"""The time scales of a drive: its period, and the longest step that misses no swing of it."""
+"""Compute the time scales of a drive: the period, and the longest step that misses no swing of the drive."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from synchain.models.dynamics.periodicity import Drive, as_function, drive_of, n
 from synchain.models.mechanics.components import TIME
 
 POINTS = 1 << 14
-"""Samples of a drive in one period: a choice of time."""
+"""Number of samples of a drive in one period: a choice for speed."""
 
 PERIODS = 16
-"""Factor of the samples of a drive without a period: a choice of time."""
+"""A drive without a period has PERIODS times as many samples: a choice for speed."""
 
 RESOLVED = 2.0
-"""Least distance, in samples, of two zeros that are distinct without a parabola."""
+"""Two zeros closer than this number of samples count as distinct only if a parabola separates them."""
 
 WIDTH = 2.0
 """Change of the argument of tanh over which it rises by three quarters of its height."""
@@ -39,9 +39,10 @@ def periods(equations: Equations, parameters: np.ndarray) -> np.ndarray:
 def longest_steps(equations: Equations, parameters: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Return the longest step (cells,) at parameters (cells, parameters) of runs up to the times `end` (cells,).
 
-    A longer step could miss a swing or a pulse of the drive.  The limit is half the period of the fastest sine or cosine of
-    time, or the shortest time between two zeros, jumps, kinks (`Drive.gaps`) or rises (`Drive.rises`) of another function
-    of time; inf without a drive.  A drive without a period is sampled up to `end`.
+    A longer step could miss a swing or a pulse of the drive. For sines and cosines of time, the limit is half the
+    period of the fastest. For another function of time, the limit is the shortest time between two zeros, jumps, kinks
+    (`Drive.gaps`) or rises (`Drive.rises`). Without a drive the limit is inf. A drive without a period is sampled up to
+    `end`.
     """
     if not equations.forced or not len(parameters):
         return np.full(len(parameters), math.inf)
@@ -51,15 +52,16 @@ def longest_steps(equations: Equations, parameters: np.ndarray, end: np.ndarray)
 
 
 def half_swing(equations: Equations, values: Mapping[str, np.ndarray], end: float = 1e3) -> float:
-    """Return the least of the longest steps of some rows of parameters by name, see `longest_steps`."""
+    """Return the least of the `longest_steps` of rows of parameters, which are given by name."""
     rows = max((len(column) for column in values.values()), default=1)
     return float(_half_swings(equations, values, np.full(rows, end)).min(initial=math.inf))
 
 
 def by_place(equations: Equations, parameters: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the drive's parameters of cells (cells, parameters) by their names in templates: a row for each cell and place.
+    """Return the parameters of the drive by their names in templates, with a row for each cell and place.
 
-    Places are the nodes and, beside them, the links; NaN for parameters that a place lacks.
+    Places are the nodes and the links. The value is NaN for a parameter that a place does not have.
+    Shapes: parameters (cells, parameters).
     """
     drive = _drive(equations)
     names = {name for expr in (*drive.paces, *drive.gaps, *drive.rises) for name in names_in(expr)}
@@ -103,7 +105,7 @@ def _half_swings(equations: Equations, values: Mapping[str, np.ndarray], end: np
     fastest = np.fmax.reduce([np.zeros(rows), *(_frequencies(pace, values, rows) for pace in drive.paces)])
     with np.errstate(divide="ignore"):
         longest = np.where(fastest > 0.0, math.pi / fastest, math.inf)
-    # Functions of parameters that no row has belong to other templates.
+    # Leave out functions of parameters that are absent: they belong to other templates.
     gaps, rises = (
         tuple(expr for expr in exprs if {*names_in(expr)} <= {*values, TIME.name})
         for exprs in (drive.gaps, drive.rises)
@@ -121,13 +123,13 @@ def _shortest_stays(
     periods: np.ndarray,
     end: np.ndarray,
 ) -> np.ndarray:
-    """Return the shortest time (rows,) between two zeros of expressions of time; inf if there are no two.
+    """Return the shortest time (rows,) between two zeros of expressions of time; inf for fewer than two zeros.
 
     Shapes: values (rows,), periods (rows,), end (rows,).
 
     Notes
     -----
-    Two zeros of one smooth expression are found however close they are, others if they are RESOLVED points apart.
+    Two zeros of one smooth expression are found at any distance; other zeros must be RESOLVED samples apart.
     """
     _, names = _written((*gaps, *rises))
     ends = np.where(periods > 0.0, 0.0, end)
@@ -142,21 +144,24 @@ def _shortest(gaps: tuple[sp.Expr, ...], rises: tuple[sp.Expr, ...], *row: float
     """Return the shortest time of one row: values of the parameters, the period and the end."""
     functions, _ = _written((*gaps, *rises))
     *parameters, period, end = row
-    # Two periods hold a complete interval of each kind at least.
+    # Two periods contain at least one complete interval between any two zeros.
     length, points = (2.0 * period, 2 * POINTS) if period else (end, PERIODS * POINTS)
     times, pitch = np.linspace(0.0, length, points + 1, retstep=True)
     with np.errstate(all="ignore"):
         samples = [np.broadcast_to(g, times.shape) for g in functions(times, *parameters)]
         passages = [_passages(g, k >= len(gaps)) for k, g in enumerate(samples)]
         dips = [_dips(g) for g in samples[: len(gaps)]]
-    # Between zeros of one function, and between zeros of any two.
+    # Collect the distances between zeros of one function, and between zeros of different functions.
     apart = np.concatenate([_apart(zeros) for zeros in (*passages, np.concatenate(passages, axis=1))])
     stays = np.concatenate([apart[apart > RESOLVED], *dips])
     return float(pitch * np.min(stays[stays * pitch > TOUCH * length], initial=math.inf))
 
 
 def _passages(values: np.ndarray, rises: bool) -> np.ndarray:
-    """Return (2, passages) in samples: where values change their sign, and how long they take to rise, 0 if they jump."""
+    """Return the positions of changes of sign and their rise times (2, passages), in samples.
+
+    A jump has the rise time 0.
+    """
     nonzero = np.flatnonzero(values)
     old, new = values[nonzero[:-1]], values[nonzero[1:]]
     passed = old * new < 0.0
@@ -171,7 +176,10 @@ def _apart(passages: np.ndarray) -> np.ndarray:
 
 
 def _dips(values: np.ndarray) -> np.ndarray:
-    """Return the lengths, in samples, for which parabolas through three values leave the side on which these begin and end."""
+    """Return the distances, in samples, between two zeros that lie between neighbouring samples of one sign.
+
+    A parabola through three samples detects such zeros.
+    """
     before, here, after = values[:-2], values[1:-1], values[2:]
     slope, bend = 0.5 * (after - before), after - 2.0 * here + before
     bottom = here - 0.5 * slope * slope / bend

@@ -1,4 +1,4 @@
-"""Slip states of oscillators at their start, and the clock that times their events."""
+"""Compute the slip states of oscillators at the start, and the period of the clock that times events."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ CLOCK = 8.0
 
 
 def with_modes(equations: Equations, start: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-    """Return initial states with the slip states that velocities and loads imply at the time 0.
+    """Return initial states with the slip states that follow from velocities and loads at time 0.
 
     An oscillator at exactly the ground's velocity sticks if static friction can hold it.
     Shapes: start (cells, 3 n), parameters (cells, count).
@@ -49,7 +49,7 @@ def _link_forces(
     values: dict[sp.Symbol, np.ndarray],
     of_nodes: dict[sp.Symbol, np.ndarray],
 ) -> np.ndarray:
-    """Return the forces (cells, n) of the links on each oscillator if it moves with the ground, at `speed`."""
+    """Return the forces (cells, n) of the links on each oscillator that moves with the ground, at `speed`."""
     n = equations.n
     total = np.zeros((len(states), n))
     if not equations.edges:
@@ -71,10 +71,10 @@ def _link_forces(
 
 
 def local_clock(equations: Equations, period: np.ndarray) -> np.ndarray:
-    """Return the lengths (cells,) of the clocks of cells, of which `period` (cells,) is the period of the drive, 0 for none.
+    """Return the period (cells,) of the clock of each cell; `period` (cells,): period of the drive, 0 without a drive.
 
-    Events are located on the clock, to rounding.  If time does not enter the equations any length is a period, and a short
-    one keeps the digits of events in long runs.
+    Times of events are read from the clock, with its rounding error. If time does not enter the equations, the period
+    may have any length; a short one keeps the digits of events in long runs.
     """
     if not equations.sticks or any(e.has(TIME) for e in equations.node.expressions):
         return period

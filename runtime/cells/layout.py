@@ -1,4 +1,4 @@
-"""The numbered blocks of a sweep: cells that are run, stored and resumed together."""
+"""Divide a sweep into numbered blocks: cells that are run, stored and resumed together."""
 
 from __future__ import annotations
 
@@ -10,21 +10,22 @@ import numpy as np
 from synchain.models.scenes.scene import Scene
 
 REFILLS = 16
-"""Most cells of a block for each lane: a choice, so that few lanes idle at the end of a block."""
+"""Largest number of cells of a block per lane: a choice, so that few lanes are idle at the end of a block."""
 
 SHARE = 8
-"""A block is at most this part of the work of one worker, so that all are busy to the end: a choice."""
+"""A block is at most 1/SHARE of the work of one worker, so that all workers are busy to the end: a choice."""
 
 LONGEST = 1e7
-"""Most oscillators times periods of a block with more than one cell a lane: about a minute of work."""
+"""Largest product of oscillators and periods of a block with more than one cell per lane: about a minute of work."""
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
     """Blocks of `size` cells, in C order over the axes.
 
-    In a continued sweep (`columns` values of the last axis, `falling` if it runs downwards) a block is one column of up to
-    `size` rows, and each block depends on the one before it in its row.
+    In a continued sweep, a block is one column of up to `size` rows: cells of one value of the last axis. Each block
+    depends on the block of the value before. `columns`: number of values of the last axis; 0 if the sweep is not
+    continued. `falling`: True if the values are run in falling order.
     """
 
     cells: int
@@ -46,16 +47,16 @@ class Layout:
         return math.ceil(self.cells / steps / self.size) * steps
 
     def part(self, part: tuple[int, int] | None) -> np.ndarray:
-        """Return whether each block (blocks,) belongs to part (k, N) of the sweep; to a whole sweep (None) all do.
+        """Return whether each block (blocks,) belongs to part (k, N) of the sweep; all blocks belong to part None.
 
-        Parts take the blocks in turn, so that a costly region of a map is shared among them. The columns of a
-        continued sweep depend on one another and stay together.
+        The blocks are dealt to the parts in turn, so that all parts share a costly region of a map. The columns of a
+        continued sweep depend on one another, and stay in one part.
         """
         chains = np.arange(self.blocks) // max(self.columns, 1)
         if part is None:
             return np.ones(self.blocks, dtype=bool)
         k, parts = part
-        return np.asarray(chains % parts == k - 1)  # none, if there are more parts than independent blocks
+        return np.asarray(chains % parts == k - 1)  # a part may be empty
 
     @property
     def lengths(self) -> np.ndarray:
@@ -83,7 +84,10 @@ class Layout:
 
 
 def block_size(scene: Scene, width: int, workers: int, cells: int | None = None) -> int:
-    """Return the cells of a block, a multiple of the number of lanes: enough to keep them busy, few enough to be lost."""
+    """Return the number of cells of a block, a multiple of the number of lanes.
+
+    A block keeps all lanes busy, but is small enough to be lost when a run is interrupted.
+    """
     if cells is None:
         cells = scene.cells // (scene.shape[-1] if scene.continued else 1)
     lengths = scene.transient + scene.window

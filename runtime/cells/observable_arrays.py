@@ -1,4 +1,4 @@
-"""Observables and sections of a scene: the values that its kernel computes, and the arrays of its result."""
+"""Map observables and sections of a scene to the values that a kernel computes, and to the arrays of a result."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ from synchain.models.scenes.scene import Scene, Section
 
 
 def watched(scene: Scene) -> Recording:
-    """Return the observables, sections and stop of a scene's kernel, the energy in them as sums over nodes and links."""
+    """Return the observables, sections and stop of a scene's kernel.
+
+    The energy is replaced by sums over nodes and links.
+    """
     sections = Sections(scene)
     recording = Recording((), None, ObservableArrays(scene).values, sections.values, sections.stop)
     if has_own_energy(scene.model) or not any(e.has(ENERGY) for e in (*recording.observed, *recording.events)):
@@ -48,22 +51,22 @@ class ObservableArrays:
 
     @cached_property
     def _rows(self) -> dict[sp.Expr, int]:
-        """The number of components of each value: n with one for each node, else 1."""
+        """The number of components of each value: n for a value of each node, else 1."""
         equations = self.scene.equations
         return {value: equations.n if with_rows(equations, value) else 1 for value in self.values}
 
     @property
     def numbers(self) -> int:
-        """Numbers of all observables of a cell."""
+        """Number of values of all observables of a cell."""
         return sum(self._rows[observable.value] for observable in self.scene.observe.values())
 
     @property
     def tallies(self) -> int:
-        """Numbers that the kernel tallies for a cell: the length of time, and all tallies of each value."""
+        """Number of tallies of a cell in the kernel: the length of time, and all tallies of each value."""
         return 1 + len(Tally) * sum(self._rows.values()) if self.values else 0
 
     def columns(self) -> Iterator[tuple[str, bool, slice]]:
-        """Yield the name of each observable, whether it has a value for each node, and its columns in `Buffers.sums`."""
+        """Yield the name of each observable, whether each node has a value, and the columns in `Buffers.sums`."""
         first = len(SumColumn)
         for name, observable in self.scene.observe.items():
             rows = self._rows[observable.value]
@@ -71,10 +74,10 @@ class ObservableArrays:
             first += rows
 
     def summary(self, sums: np.ndarray) -> np.ndarray:
-        """Return the `sums` of buffers out of those of a kernel; NaN in cells that ended before their window."""
+        """Convert the `sums` of a kernel to those of a result; NaN in cells that ended before their window."""
         if not self.values:
             return sums
-        # The kernel's columns: the length of the window so far, then the tallies of each value.
+        # The columns of the kernel are the length of the window so far, then the tallies of each value.
         length = sums[:, len(SumColumn), None]
         length = np.where(length > 0.0, length, np.nan)
         tallies = sums[:, len(SumColumn) + 1 :].reshape(len(sums), -1, len(Tally))
@@ -118,7 +121,7 @@ class Sections:
         """Yield names, dimensions and values of the variables out of points (cells, room, 1 + width)."""
         room = max(most, 1)
         for k, (name, section) in enumerate(self.scene.sections.items()):
-            # The points of this section first, in their order, without the column of its number.
+            # Move the points of this section to the front, in order, without the column of the section's number.
             belongs = points[:, :, 1] == k
             order = np.argsort(~belongs, axis=1, kind="stable")[:, :room]
             rows = np.full((len(points), room, 1 + len(_kept(section))), np.nan)
@@ -131,7 +134,7 @@ class Sections:
                 yield name, ("point", f"{name}_kept"), rows[:, :, 1:]
 
     def points(self, cells: int, data: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Return the points (cells, room, 1 + width) from variables by their names, the inverse of `variables`."""
+        """Return the points (cells, room, 1 + width) from variables by name; the inverse of `variables`."""
         parts = []
         for k, (name, section) in enumerate(self.scene.sections.items()):
             times = np.reshape(data[f"{name}_time"], (cells, -1))
@@ -159,7 +162,10 @@ def _kept(section: Section) -> tuple[str, ...]:
 
 
 def _over_window(window: ObservedWindow, tallies: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """Return a reduction (cells, rows) of tallies (cells, rows, len(Tally)) over a window; NaN where a value was undefined."""
+    """Return a reduction (cells, rows) over a window from tallies (cells, rows, len(Tally)).
+
+    NaN for undefined values.
+    """
     gap = tallies[:, :, Tally.SUM] / length
     defined = np.where(np.isfinite(gap), 0.0, np.nan)
     match window:

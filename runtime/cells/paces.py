@@ -1,4 +1,4 @@
-"""Rates of decay, growth, turning and change of motions in all cells at once, from exact slopes of a network's first nodes."""
+"""Compute rates of decay, growth, turning and change of motions in all cells, from the slopes of the first nodes."""
 
 from __future__ import annotations
 
@@ -20,19 +20,21 @@ from synchain.models.mechanics.components import TIME, Block, Edge, Node
 from .stiffness_rates import eigenvalue_rates, turns
 
 NODES, LINKS = 50, 5000
-"""Most nodes of a network whose slopes are computed, and most links of one layer: a choice of time."""
+"""Slopes are computed for at most this number of nodes, and of links of one layer: a choice for speed."""
 
 SHIFT = 1e-6
-"""Part of the shortest time of a motion over which the change of its rates is measured: a choice far above rounding."""
+"""The change of rates is measured over this part of the shortest time of a motion: a choice far above rounding."""
 
 NOISE = 10.0
-"""Rates, and changes of rates, below those of this many tolerances of the state count as errors of steps: a choice."""
+"""Rates, and changes of rates, that NOISE tolerances of the state could cause count as errors of steps: a choice."""
 
 BLOCK = 4096
-"""Cells that are computed at once: a choice of memory."""
+"""Number of cells that are computed at once: a choice that bounds the memory."""
 
 STEP, ENDLESS = 1e-200, 1e60
-"""Length of steps along the imaginary axis, and least size of infinite slopes: that of sqrt(x) at 0 is computed as 1e100."""
+"""STEP: length of steps along the imaginary axis. ENDLESS: a larger slope counts as infinite; such a step gives 1e100
+for the
+infinite slope of sqrt(x) at 0."""
 
 Column = int | np.ndarray
 
@@ -40,9 +42,10 @@ Column = int | np.ndarray
 class Paces(NamedTuple):
     """Rates per unit of time in each cell (cells,).
 
-    Of the eigenvalues: `fastest` is the rate of decay or growth, `turning` of rotation, `growth` of growth alone, `parted` of
-    decay far faster than the slowest motion of a node, and `size` bounds them all.  `going` is the relative change of the
-    rates along the motion, 0 at rest.  `fastest` is inf where a rate is finite and its slope is not.
+    From the eigenvalues: `fastest` is the fastest decay or growth, `turning` the fastest rotation, `growth` the fastest
+    growth, `parted` the fastest decay that is far faster than the slowest motion of its node; `size` bounds all
+    eigenvalues. `going` is the relative change of the rates along the motion, 0 at rest. `fastest` is inf if a rate is
+    finite but has an infinite slope.
     """
 
     fastest: np.ndarray
@@ -66,8 +69,9 @@ class TemplateRates:
     targets: np.ndarray  # (count,): the nodes
     columns: tuple[Column, ...]  # (count,): columns among the parameters of a cell
     weights: np.ndarray | None = None  # (count,): weights of links
-    share: float = 1.0  # links that each of these represents
-    # index of an argument, a state, and the value of it in the middle of a smoothed jump
+    share: float = 1.0  # number of links that each link represents
+    # for each smoothed jump: index of a state among the arguments, and the value of this state in the middle of the
+    # jump
     turned: tuple[tuple[int, Callable[..., list[float | np.ndarray]]], ...] = ()
 
     def arguments(self, state: np.ndarray, parameters: np.ndarray, time: np.ndarray) -> list[np.ndarray]:
@@ -120,7 +124,7 @@ class Templates:
         with np.errstate(all="ignore"):
             size = _sizes(blocks)
             size = np.where(np.isnan(size), np.inf, size)
-            size = np.where((size == np.inf) & ~np.isfinite(rates).all(axis=1), 0.0, size)  # there are no rates
+            size = np.where((size == np.inf) & ~np.isfinite(rates).all(axis=1), 0.0, size)  # rates are undefined
             # Follow the motion for a short time, and compare its rates, relative to the states or to their noise.
             step = SHIFT * np.minimum(1.0 / np.maximum(size, 1e-300), shortest)
             ahead = self._rates(state + step[:, None] * rates, parameters, time + step)
@@ -133,14 +137,14 @@ class Templates:
         return Paces(*eigenvalue_rates(blocks), going, size)
 
     def reach(self, state: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-        """Return how far (cells,) the rates at the start carry cells in the shortest time of their motion."""
+        """Return the distance (cells,) that the initial rates cover in the shortest time of the motion."""
         time = np.zeros(len(state))
         with np.errstate(all="ignore"):
             speed = np.abs(self._rates(state, parameters, time)).max(axis=1)
             return np.asarray(np.nan_to_num(speed / _sizes(self.blocks(state, parameters, time)), nan=0.0, posinf=0.0))
 
     def layers(self, state: np.ndarray, parameters: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield the blocks (cells, count, p, p) of nodes and links in the middle of each smoothed jump, and close by."""
+        """Yield the blocks (cells, count, p, p) of nodes and links in the middle of each smoothed jump, and near it."""
         for part in self.parts:
             for k, middle in part.turned:
                 arguments = part.arguments(state, parameters, np.zeros(len(state)))
@@ -151,7 +155,7 @@ class Templates:
                     yield (1.0 if part.source is None else 2.0) * slopes
 
     def _rates(self, state: np.ndarray, parameters: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """Return the rates (cells, dimension), zero beyond the first nodes."""
+        """Return the rates (cells, dimension); those of nodes after the first ones are set to zero."""
         rates = np.zeros((len(state), self.dimension))
         for part in self.parts:
             of_part = part.values(part.rates, part.arguments(state, parameters, time))
@@ -161,7 +165,10 @@ class Templates:
         return rates
 
     def blocks(self, state: np.ndarray, parameters: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """Return the diagonal blocks (cells, nodes, p, p) of the Jacobian, with twice the terms of links: a bound for springs."""
+        """Return the diagonal blocks (cells, nodes, p, p) of the Jacobian.
+
+        Terms of links count twice, a bound for springs.
+        """
         blocks = np.zeros((len(state), self.nodes, self.size, self.size))
         for part in self.parts:
             size = part.states.shape[1]
@@ -200,7 +207,7 @@ def _sizes(blocks: np.ndarray) -> np.ndarray:
 
 
 def fastest_rates(equations: Equations, states: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-    """Return the fastest decay, growth or turning (states,) at states (states, dimension) with one row of parameters."""
+    """Return the fastest decay, growth or turning (states,) at states (states, dimension) for one row of parameters."""
     count = len(states)
     paces = Templates(equations).paces(states, np.tile(parameters, (count, 1)), np.zeros(count), np.ones(count), None)
     return np.asarray(np.maximum(paces.fastest, paces.turning))
@@ -248,7 +255,7 @@ def _link_parts(equations: Equations, slots: dict[str, int]) -> Iterator[Templat
     for layer in equations.layers:
         pairs, share = layer.links, 1.0
         if isinstance(pairs, AllPairs):
-            # Of all pairs a few evenly spread sources of each node, each of which represents several.
+            # All pairs of nodes: take a few evenly spread sources of each node, each of which represents several.
             count = min(pairs.n, NODES)
             each = min(pairs.n - 1, LINKS // count)
             gaps = [1 + k * (pairs.n - 1) // each for k in range(each)]
@@ -302,16 +309,16 @@ def _of_nodes(equations: Equations, slots: dict[str, int], name: str, nodes: lis
 def _turned(
     symbols: tuple[sp.Symbol, ...], rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...]
 ) -> tuple[tuple[int, Callable[..., list[float | np.ndarray]]], ...]:
-    """Return for each smoothed jump the index of a state among the arguments, and its value in the middle of the jump."""
+    """Return, for each smoothed jump, the index of a state among the arguments, and its value in the middle of the jump."""
     return tuple((symbols.index(state), _function(symbols, (middle,))) for state, middle in turns(rates, states))
 
 
 def _complex_steps(
     rates: Callable[..., list[float | np.ndarray]], size: int
 ) -> Callable[..., list[float | np.ndarray]]:
-    """Return the slopes of analytic rates, row by row, by steps along the imaginary axis: SymPy takes seconds for large nodes.
+    """Return the slopes of analytic rates, row by row, from steps along the imaginary axis.
 
-    Source: W. Squire, G. Trapp, SIAM Review 40, 110 (1998).
+    Symbolic derivatives of large nodes would take seconds. Source: W. Squire, G. Trapp, SIAM Review 40, 110 (1998).
     """
 
     def slopes(*arguments: np.ndarray) -> list[float | np.ndarray]:

@@ -1,4 +1,4 @@
-"""From a scene to the arrays that a kernel works on: one row of numbers for each cell of the sweep."""
+"""Lay out the cells of a scene's sweep as rows of numbers for a kernel."""
 
 from __future__ import annotations
 
@@ -15,21 +15,23 @@ from .drive_times import longest_steps, periods
 from .initial_modes import local_clock, with_modes
 
 FIRST_STEP = 1e-4
-"""Step tried first in every cell, in units of non-dimensional time: a choice; step control enlarges it sixfold at a time."""
+"""Step tried first in every cell, in units of non-dimensional time: a choice; step control enlarges it sixfold at a
+time."""
 
 LOOKED_AT = 200
-"""Nodes, of all cells together, whose rates decide on the kernel that is compiled first: a choice."""
+"""The kernel that is compiled first is chosen by the rates of this number of nodes, in all cells together: a choice."""
 
 
 @dataclass(frozen=True, slots=True)
 class CellRows:
-    """Rows of cells as a kernel takes them."""
+    """Rows of cells, as a kernel reads them."""
 
     start: np.ndarray  # (cells, dimension): initial states
     numbers: np.ndarray  # (cells, parameters): parameters, in the order of `Equations.parameters`
-    # (cells, len(SpanColumn)): start and end of the window and the period of the equations, in non-dimensional time, the
-    # synchronisation error below which a cell ends early (0: none does), the first step, the longest one, and the
-    # steps after which the cell first pauses (inf: it never does)
+    # (cells, len(SpanColumn)): start and end of the window and period of the equations, in non-dimensional time;
+    # synchronisation error below which a cell ends early (0: never); first step; longest step; number of steps before
+    # the
+    # first pause (inf: never)
     spans: np.ndarray
 
     def __post_init__(self) -> None:
@@ -53,9 +55,9 @@ def plan(scene: Scene, near: np.ndarray | None = None) -> CellRows:
 
 
 class Planner:
-    """Lay out any cells of a scene, so that the rows of all cells need not be in memory at once.
+    """Lay out any cells of a scene, so that only some rows are in memory at once.
 
-    starts (cells, dimension): states of all cells to start from in place of the scene's, which axes of states overwrite.
+    `starts` (cells, dimension): initial states that replace those of the scene; axes of initial states replace both.
     """
 
     def __init__(self, scene: Scene, starts: np.ndarray | None = None) -> None:
@@ -71,7 +73,7 @@ class Planner:
         return Planner, (self.scene, self.starts)
 
     def columns(self, cells: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the value of each axis, and of each draw, in each of these cells."""
+        """Return the value of each axis and of each draw in these cells, by name."""
         if not self.scene.shape:
             return {}
         indices = np.unravel_index(cells, self.scene.shape)
@@ -80,7 +82,10 @@ class Planner:
         return columns | {name: values[indices[-1]] for name, values in self.drawn.items()}
 
     def rows(self, cells: np.ndarray, near: np.ndarray | None = None) -> CellRows:
-        """Return the rows of these cells; `near` (cells,) is the column `SpanColumn.NEAR` of their spans (default: 0)."""
+        """Return the rows of these cells.
+
+        `near` (cells,) is the column `SpanColumn.NEAR` of their spans (default: 0).
+        """
         columns = self.columns(cells)
         parameters = self._parameters(columns, len(cells))
         start = np.empty((len(cells), len(self.scene.y0)))
@@ -126,11 +131,14 @@ class Planner:
         return spans
 
     def extremes(self) -> CellRows:
-        """Return the rows of a few cells in which every axis takes its smallest, its largest and its value nearest to 0."""
+        """Return the rows of a few cells with the smallest and the largest value of each axis, and the one nearest to 0."""
         return self.rows(self._extremes())
 
     def sample(self) -> CellRows:
-        """Return the rows of the extreme cells and of others, evenly spread over the sweep: of LOOKED_AT nodes or two cells."""
+        """Return the rows of the extreme cells, and of other cells that are evenly spread over the sweep.
+
+        All rows together have about LOOKED_AT nodes; there are at least two other cells.
+        """
         spread = np.linspace(0, math.prod(self.scene.shape) - 1, max(2, LOOKED_AT // self.equations.n))
         return self.rows(np.union1d(self._extremes(), spread.round().astype(int)))
 
@@ -149,5 +157,5 @@ class Planner:
 
 
 def _ends(values: np.ndarray) -> tuple[int, int, int]:
-    """Return where values are smallest, largest and nearest to 0."""
+    """Return the indices at which values are smallest, largest and nearest to 0."""
     return int(values.argmin()), int(values.argmax()), int(np.abs(values).argmin())

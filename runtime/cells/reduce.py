@@ -1,7 +1,7 @@
-"""Exact reduction of a scene: leave out terms that are zero in every cell, and merge oscillators that move as one.
+"""Reduce a scene exactly: leave out terms that are zero in every cell, and merge oscillators with identical motion.
 
-`synchain.models.dynamics.reduction` proves each reduction.  Results are expanded to the whole network.  docs/skips.md lists
-all reductions, also those of the emitted text and of the kernel's driver.
+`synchain.models.dynamics.reduction` proves each reduction. Results are expanded to the unreduced network. docs/skips.md
+lists all reductions, including those in the text of a kernel and in the kernel's driver.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ PERIODIC = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NodeMerge:
-    """The columns by which states of a whole network and of one with merged oscillators follow from each other."""
+    """Columns that convert states between an unreduced network and one with merged oscillators."""
 
-    states: np.ndarray  # columns of the whole network's state that start the reduced one
-    places: np.ndarray  # column of the reduced state in which each state of the whole network is found
+    states: np.ndarray  # columns of the unreduced state that are the start of the reduced network
+    places: np.ndarray  # for each state of the unreduced network, its column in the reduced state
     # True if all oscillators are stepped as one and their synchronisation error, which is 0, is a record
     together: bool
 
     @classmethod
     def of(cls, network: Equations, reduced: Equations, classes: tuple[int, ...], together: bool) -> NodeMerge:
-        """Return the columns from the class of each oscillator of a network."""
+        """Return the merge that follows from the class of each oscillator."""
         if reduced.n == network.n:
             same = np.arange(network.dimension)
             return cls(same, same, together)
@@ -72,11 +72,11 @@ class NodeMerge:
         return expanded
 
     def contract(self, buffers: Buffers) -> Buffers:
-        """Return the part of the whole network's results that the reduced network has."""
+        """Return the part of the unreduced network's results that belongs to the reduced network."""
         return self._take(buffers, self.states)
 
     def _take(self, buffers: Buffers, columns: np.ndarray) -> Buffers:
-        """Return the buffers of a network whose states are these columns of another one's."""
+        """Return buffers that contain these columns of the states."""
         if not self.merges:
             return buffers
         points = np.concatenate([[PointColumn.TIME], columns + PointColumn.STATE])
@@ -90,17 +90,17 @@ class NodeMerge:
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class ReducedScene:
-    """The part of a scene that is integrated, and how results of the whole scene follow from it."""
+    """The part of a scene that is integrated, with all data to expand its results to the unreduced scene."""
 
     scene: Scene
-    planner: Planner = field(repr=False)  # lays out its cells
+    planner: Planner = field(repr=False)  # lays out the cells of the scene
     equations: Equations = field(repr=False)  # the equations that the kernel steps
     recording: Recording = field(repr=False)  # records, observables, sections and stop of the kernel
     merge: NodeMerge = field(repr=False)  # which oscillators are stepped as one
-    numbers: np.ndarray = field(repr=False)  # columns of the whole network's parameters that are left
-    skipped: tuple[str, ...]  # sentences about the parts that were left out
-    kept: tuple[str, ...]  # sentences about parts that were not, and why
-    jumps: bool  # whether a cell that repeats itself leaves out whole cycles
+    numbers: np.ndarray = field(repr=False)  # columns of the unreduced network's parameters that remain
+    skipped: tuple[str, ...]  # sentences about parts that are left out
+    kept: tuple[str, ...]  # sentences about parts that remain, with the reason
+    jumps: bool  # True if a cell with periodic motion skips whole cycles
 
     @property
     def dimension(self) -> int:
@@ -123,7 +123,10 @@ class ReducedScene:
         return Sections(self.scene).width(self.dimension)
 
     def empty(self, cells: int, room: int, observed: int | None = None) -> Buffers:
-        """Return buffers of cells of the reduced network, of its result or of what a kernel tallies."""
+        """Return empty buffers for cells of the reduced network.
+
+        `observed`: number of tallies, by default of observables.
+        """
         observed = self.observed.numbers if observed is None else observed
         return Buffers.empty(cells, self.dimension, room, self.samples, observed, self.point_size)
 
@@ -139,7 +142,7 @@ class ReducedScene:
             )
 
     def rows(self, rows: CellRows) -> CellRows:
-        """Return the rows of the reduced network out of those of the whole one."""
+        """Convert rows of the unreduced network to rows of the reduced network."""
         start, parameters = rows.start, rows.numbers
         if self.merge.merges:
             start = np.take(start, self.merge.states, axis=1)
@@ -188,7 +191,8 @@ def reduce_scene(
         variable = equations.state[int(merge.places[network.state.index(scene.section.variable)])]
         section = sp.Symbol(variable, real=True) - sp.Rational(repr(scene.section.level))
     records = tuple(r for r in scene.record if not (together and r == "sync_error"))
-    # The synchronisation error, a sum of distances from the first oscillator, counts the oscillators of each other class.
+    # The synchronisation error, a sum of distances from the first oscillator, counts the oscillators of each other
+    # class.
     sizes, multiplicity = Counter(classes), None
     if "sync_error" in scene.record and any(size > 1 for k, size in sizes.items() if k != 0):
         multiplicity = tuple(sizes[k] for k in range(len(sizes)))
@@ -229,7 +233,10 @@ def _observed_parameters(scene: Scene, recording: Recording) -> set[str]:
 
 
 def _fold(scene: Scene, observed: set[str], fold_all: bool, skipped: list[str], kept: list[str]) -> Equations:
-    """Replace parameters that are 0 in every cell, or fixed with `fold_all`, by numbers; keep those that are `observed`."""
+    """Replace parameters by their values if they are 0 in every cell; with `fold_all`, if they are equal in every cell.
+
+    Parameters that are `observed` remain.
+    """
     equations = scene.equations
     for name, value in _fixed(scene).items():
         if (value != 0.0 and not fold_all) or name not in equations.parameters:
@@ -243,7 +250,7 @@ def _fold(scene: Scene, observed: set[str], fold_all: bool, skipped: list[str], 
         if seen:
             kept.append(f"parameter: {name} = {value:g} in every cell, but {', '.join(seen)} is observed")
             continue
-        # Other parameters may disappear with it, or all terms with time, or all links.
+        # Other parameters may disappear together with this one, or all terms with time, or all links.
         gone = [p for p in equations.parameters if p not in folded.parameters and p != name]
         too = f" together with {', '.join(gone)}" if gone else ""
         if equations.forced and not folded.forced:
@@ -259,7 +266,7 @@ def _fold(scene: Scene, observed: set[str], fold_all: bool, skipped: list[str], 
 
 @lru_cache(maxsize=64)
 def _without(equations: Equations, name: str, value: Fraction) -> Equations:
-    """Return the equations at one value of a parameter; runs of one model share them."""
+    """Return the equations at one value of a parameter; cached for all runs of one model."""
     return substitute_constants(equations, {name: value})
 
 
@@ -280,7 +287,7 @@ def _present(scene: Scene, equations: Equations) -> list[str]:
 def _merge(
     scene: Scene, equations: Equations, skipped: list[str], kept: list[str]
 ) -> tuple[Equations, tuple[int, ...]]:
-    """Merge oscillators that move as one in every cell; return the equations and the class of each oscillator."""
+    """Merge oscillators with identical motion in every cell; return the equations and the class of each oscillator."""
     n, unmerged = scene.n, (equations, tuple(range(scene.n)))
     if equations.mixed:
         kept.append("quotient: nodes of several kinds are stepped one by one")
@@ -288,7 +295,7 @@ def _merge(
     if scene.observe or scene.sections or scene.stop:
         kept.append(f"quotient: the {n} oscillators are observed one by one")
         return unmerged
-    # A component whose starts all differ, in every cell, decides at once, also in a large network.
+    # If all starts of a component differ in every cell, nothing merges: decide at once, without the search for classes.
     moved = {parts.base for axis in (*scene.axes, *scene.drawn) if (parts := NodeName.parse(axis.name))}
     all_apart = any(len(set(states)) == n for name, states in scene.initial.items() if name not in moved)
     colours = [] if all_apart else _colours(scene)
@@ -313,7 +320,7 @@ def _merge(
 
 
 def _colours(scene: Scene) -> list[Hashable]:
-    """Return the start and the parameters of each oscillator in all cells; colours are equal if these are in every cell."""
+    """Return a colour for each oscillator; two colours are equal if start and parameters are equal in every cell."""
     drawn = {axis.name for axis in scene.drawn}
     swept = {axis.name: axis.values for axis in (*scene.axes, *scene.drawn)}
     colours: list[Hashable] = []
@@ -332,9 +339,12 @@ def _colours(scene: Scene) -> list[Hashable]:
 
 
 def explain(reduction: ReducedScene) -> str:
-    """Return a text: the parts of a scene that are left out and why, those that are not, and what a cell skips as it runs."""
+    """Return a text that lists the parts of a scene that are left out and the reasons, and the parts that remain.
+
+    The text also lists the parts of a run that a cell may skip.
+    """
     scene, records = reduction.scene, reduction.recording.records
-    # Terms and records that the scene never had.
+    # List terms and records that the scene does not have.
     absent = []
     if not scene.forced:
         absent.append("forcing: time does not occur in the equations; no time terms")

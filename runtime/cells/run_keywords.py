@@ -16,13 +16,13 @@ from synchain.models.scenes.scene import KEYWORDS, Scene, check_scene
 from synchain.models.sweeps.parameters import without
 
 ORBITS = {"executor": "its orbits advance on threads of this process, as many as `workers` says"}
-"""Keywords that functions which advance several orbits at once refuse, and why."""
+"""Keywords that a function of several orbits does not accept, with the reason for the error message."""
 
 ONE_ORBIT = {name: "it advances one orbit, step after step, on one thread" for name in ("workers", "executor")}
-"""Keywords that functions which advance a single orbit refuse, and why."""
+"""Keywords that a function of a single orbit does not accept, with the reason for the error message."""
 
 SHOWN = 12
-"""Most initial states that an error lists: a choice."""
+"""Largest number of initial states in an error message: a choice."""
 
 ONE_CELL: Mapping[str, Any] = {
     "axes": (),
@@ -33,17 +33,17 @@ ONE_CELL: Mapping[str, Any] = {
     "sections": None,
     "stop": None,
 }
-"""Settings of a scene that sweeps and records nothing, for functions that choose themselves what they run."""
+"""Settings of a scene without sweep and records, for functions that choose their own cells and records."""
 
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """Parameters of a scene from the call of a public function."""
+    """Values of parameters in the call of a public function."""
 
-    function: Callable[..., object]  # its name and its keywords appear in errors
+    function: Callable[..., object]  # the public function, for the names in error messages
     table: Mapping[str, object] | None = None  # the argument `parameters`
     keywords: Mapping[str, object] = field(default_factory=dict)  # further keywords
-    # keywords of other functions that this one refuses, and why
+    # keywords of other functions that this function does not accept, with the reason
     refused: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -58,9 +58,9 @@ class Given:
         return {check_text("parameters", name): value for name, value in (*table.items(), *self.keywords.items())}
 
     def scene(self, scene: Scene, free: Collection[str] = (), /, **settings: object) -> Scene:
-        """Return the single cell of a scene that has these parameters, with settings that the function needs.
+        """Return a scene of a single cell with these parameters, and with the settings that the function needs.
 
-        The function does not depend on parameters that are `free`.
+        `free`: names of parameters on which the function does not depend.
         """
         self.expect_one_cell(scene, free, stops="stop" in settings)
         numbers = self.checked(scene)
@@ -73,10 +73,10 @@ class Given:
         return with_numbers(scene, numbers, **{**ONE_CELL, **settings})
 
     def expect_one_cell(self, scene: Scene, free: Collection[str] = (), *, stops: bool = False) -> None:
-        """Raise ValueError for a scene with draws, or with axes that no parameter fixes: one cell would represent all.
+        """Raise ValueError for a scene with draws, or with axes that no parameter of the call fixes.
 
-        Axes of parameters that are `free`, on which the function does not depend, pass.  A stop ends the motion; it is refused
-        too, unless the function `stops` there.
+        Axes of parameters that are `free`, on which the function does not depend, are accepted. A stop raises
+        ValueError too, unless the function `stops` there.
         """
         swept = [axis.name for axis in check_scene(scene).axes if axis.name not in {*self.values, *free}]
         for what, names, remedy in (("axes", swept, "axes=()"), ("draws", scene.draws, "realisations=0, draws=None")):
@@ -92,9 +92,9 @@ class Given:
             )
 
     def sweep(self, scene: Scene, **settings: object) -> Scene:
-        """Return a scene with parameters and initial states fixed, by a number, or swept, by a sequence.
+        """Return a scene with the values of the call: a number fixes a parameter or initial state, a sequence sweeps one.
 
-        A sequence makes an axis after those of the scene.  Settings that are None are those of the scene.
+        A sequence makes an axis after the axes of the scene. A setting that is None keeps the scene's.
         """
         fixed: dict[str, object] = {}
         swept: dict[str, object] = {axis.name: axis.values for axis in check_scene(scene).axes}
@@ -113,18 +113,18 @@ class Given:
         settings = {name: value for name, value in settings.items() if value is not None}
         if values:
             settings["axes"] = swept
-        if start:  # other components keep their defaults, which may follow other keywords
+        if start:  # other components keep their defaults, which may depend on other keywords
             settings["initial"] = {**(scene.given["initial"] or {}), **start}
         return with_numbers(scene, fixed, **settings)
 
     def parted(self) -> tuple[dict[str, Any], Given]:
-        """Return the rows of values by name, and the same call with the numbers alone."""
+        """Return the sequences of values by name, and the same call with the single numbers only."""
         rows = {name: value for name, value in self.values.items() if is_row(value)}
         numbers = {name: value for name, value in self.values.items() if name not in rows}
         return rows, replace(self, table=numbers, keywords={})
 
     def checked(self, scene: Scene, states: bool = False) -> dict[str, object]:
-        """Return the values; ValueError for a name that is no parameter, nor, with `states`, an initial state."""
+        """Return the values; ValueError for a name that is no parameter (with `states`: and no initial state)."""
         values = self.values
         for name in values:
             if not (scene.takes(name) or (states and _state(scene, name))):
@@ -132,7 +132,7 @@ class Given:
         return values
 
     def _refusal(self, scene: Scene, name: str, states: bool) -> str:
-        """Return why a name is refused."""
+        """Return the error message for a name that is not accepted."""
         of, keywords = self.function.__name__, _keywords_of(self.function)
         if name in keywords:
             return f"{of}: found its keyword {name!r} in `parameters`; expected parameters of the scene"
@@ -151,7 +151,10 @@ class Given:
 
 
 def chosen(scene: Scene, name: str, keyword: Any, default: Any) -> Any:
-    """Return a keyword; else what the scene was given, a value other than Scene's default; else the function's default."""
+    """Return a keyword; if None, the scene's value if it differs from the default of `Scene`.
+
+    Else the function's default.
+    """
     if keyword is not None:
         return keyword
     value = getattr(check_scene(scene), name)
@@ -159,7 +162,7 @@ def chosen(scene: Scene, name: str, keyword: Any, default: Any) -> Any:
 
 
 def with_numbers(scene: Scene, values: Mapping[str, object], **settings: object) -> Scene:
-    """Return a scene with some parameters changed, also those with names of keywords, and some settings."""
+    """Return a scene with changed parameters and settings; a parameter may have the name of a keyword."""
     if values:
         parameters: Mapping[object, object] = scene.given["parameters"] or {}
         changed = without(scene.model, parameters, values)
@@ -169,7 +172,7 @@ def with_numbers(scene: Scene, values: Mapping[str, object], **settings: object)
 
 
 def _state(scene: Scene, name: str) -> NodeName | None:
-    """Return the parts of the name of an initial state, or None; derive equations only for a name that looks like one."""
+    """Return the parts of the name of an initial state, or None; derive equations only for names of that form."""
     state = NodeName.parse(name)
     return state if state and state.base in scene.components and name in scene.equations.state else None
 

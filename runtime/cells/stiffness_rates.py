@@ -1,4 +1,4 @@
-"""Rates of decay, growth and turning at a state: eigenvalues of the diagonal blocks of the Jacobian, one for each node."""
+"""Compute rates of decay, growth and turning at a state: eigenvalues of each node's diagonal block of the Jacobian."""
 
 from __future__ import annotations
 
@@ -14,17 +14,20 @@ from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import TIME
 
 NODES = 50
-"""Most orbits whose rates are computed: a choice of time."""
+"""Rates are computed for at most this number of orbits: a choice for speed."""
 
 SPREAD = 30.0
-"""Ratio to the slowest motion of a node from which on a decay counts as separate: a choice."""
+"""A decay counts as separate if it is SPREAD times as fast as the slowest motion of its node: a choice."""
 
 TURNING = (sp.atan, sp.tanh, sp.erf, sp.Abs)
 """Functions that are steep, or turn sharply, where their argument is zero: the layer of a smoothed jump."""
 
 
 class FastestRates(NamedTuple):
-    """The fastest decay or growth at a state, the fastest turning, and the fastest growth; 0 where there are no numbers."""
+    """The fastest decay or growth at a state, the fastest turning, and the fastest growth.
+
+    0 for rates without a value.
+    """
 
     fastest: float
     turning: float
@@ -34,7 +37,7 @@ class FastestRates(NamedTuple):
 def mode_rates(
     variation: Variation, state: np.ndarray, parameters: np.ndarray, strengths: np.ndarray
 ) -> Iterator[FastestRates]:
-    """Yield the rates of deviations along the first orbits: without a strength, with the largest, and with the most negative."""
+    """Yield the rates of deviations along the first orbits at three strengths: 0, the largest, the most negative."""
     strengths, extreme = strengths[: len(variation.parameters)], []
     if strengths.size:
         extreme = [np.argmax(np.hypot.reduce(strengths, axis=0)), np.argmin(strengths[0])]
@@ -54,8 +57,8 @@ def mode_rates(
 def eigenvalue_rates(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the fastest decay or growth, turning, growth and parted decay (cells,) of blocks (cells, count, p, p).
 
-    A decay is parted if it is SPREAD times as fast as the slowest motion of its block.  A block with an infinite entry is
-    infinitely fast; one with a NaN does not count.
+    A decay is parted if it is SPREAD times as fast as the slowest motion of its block.  A block with an infinite entry
+    is infinitely fast; one with a NaN does not count.
     """
     endless = (np.isinf(blocks).any(axis=(2, 3)) & ~np.isnan(blocks).any(axis=(2, 3))).any(axis=1)
     blocks = np.where(np.isfinite(blocks).all(axis=(2, 3), keepdims=True), blocks, 0.0)
@@ -80,11 +83,11 @@ def eigenvalue_rates(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nda
 
 @lru_cache(maxsize=64)
 def turns(rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...]) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
-    """Return for each turning function a state, and the value of it at which the argument is zero.
+    """Return, for each turning function, a state and the value of this state at which the argument is zero.
 
-    A root of a size, which a power of unknown exponent may be, is steep at a point, and has no layer.
+    Powers of absolute values are left out: a root is steep at one point only, and so has no layer.
     """
-    # Leave out such powers, and collect the arguments of turning functions.
+    # Leave out powers of absolute values, then collect the arguments of turning functions.
     roots = {
         p: sp.S.Zero
         for e in rates
@@ -92,7 +95,7 @@ def turns(rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...]) -> tuple[tu
         if isinstance(p.base, sp.Abs) and not (p.exp - 1).is_nonnegative
     }
     gaps = {part.args[0] for e in rates for part in e.xreplace(roots).atoms(*TURNING)}
-    # The first state of which an argument is a linear function gives its zero.
+    # The zero of an argument follows from the first state in which the argument is linear.
     middles = []
     for gap in sorted(gaps, key=sp.default_sort_key):
         slopes = ((s, gap.diff(s)) for s in states)
@@ -101,7 +104,7 @@ def turns(rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...]) -> tuple[tu
 
 
 def _value(entries: tuple[tuple[sp.Expr, ...], ...], values: Mapping[str, float]) -> np.ndarray:
-    """Return the numbers of a block; NaN if it cannot be evaluated."""
+    """Return the values of a block's entries; NaN if the block cannot be evaluated."""
     symbols, function = _compiled(entries)
     shape = len(entries), len(entries[0])
     try:
