@@ -1,1 +1,1 @@
-"""Labelled results, the files that keep them, and certificates as data. Runs nothing."""
+"""Labelled results, their files, and certificates as data. Runs no simulation."""

@@ -1,11 +1,11 @@
-"""The file of a sweep that is under way: blocks of finished cells, appended as they come.
+"""The file of an unfinished sweep: a log to which each finished block of cells is appended.
 
-A file begins with MAGIC and one JSON line (its length, its checksum, then the text), which says
-what the sweep is; both stand there twice, and each copy begins a page of the disk.  Records follow,
-one for each finished block: a head with the number of the block and two checksums, then the numbers
-themselves, little endian.  Nothing is ever changed in place, so that a process that dies at any
-moment leaves whole records and at most one torn one at the end, which is written over.  A damaged
-record costs itself alone: reading goes on at the next mark that begins a head with a good checksum.
+A file begins with MAGIC and one line of JSON (length, checksum, text), which describes the sweep.  MAGIC and the line
+are written twice, and each copy begins a page of the disk.  One record for each finished block follows: a head with the
+number of the block and two checksums, then the numbers of the block, little endian.  No byte is changed in place.  A
+process that dies at any moment therefore loses at most the last record; the next process overwrites an incomplete
+record.  If a record is damaged, only this record is lost: reading continues at the next mark that begins a head with a
+correct checksum.
 """
 
 from __future__ import annotations
@@ -34,24 +34,24 @@ from ..support.status import CODES, tally
 KIND = b"synchain blocks "
 MAGIC = KIND + b"3\n"
 PAGE = 4096
-"""Bytes that a disk loses together."""
+"""Bytes of a page of the disk, the unit in which damage occurs."""
 LINE = struct.Struct("<QI")
 HEAD = struct.Struct(f"<4sQQIII{CODES}QI")
-"""Mark, block, bytes and CRC-32 of the numbers, cells, most section points, how many ended how,
-CRC-32 of all this.
+"""Head of a record: mark, block, bytes and CRC-32 of the numbers, cells, most section points, counts by status, CRC-32
+of the head.
 """
 MARK = b"blk\0"
 PIECE = 2**20
-"""Bytes that are searched for a mark at a time."""
+"""Bytes that are read at a time in the search for a mark."""
 MOST = 10**9
-"""Largest number of blocks, states and samples: that of the cells of a sweep."""
+"""Largest number of blocks, states and samples that a log may have: the largest number of cells of a sweep."""
 AGAIN = "start again with overwrite (--overwrite)"
 FLUSH = 5.0
-"""Seconds between two requests to the system that the file be safe from a loss of power as well."""
+"""Seconds between two flushes to the disk, which protect the file from a loss of power."""
 
 
 def is_block_log(path: str | os.PathLike[str]) -> bool:
-    """Return whether a file begins like a block log, or has its ending and does not begin like a result."""
+    """Return True if a file begins like a block log, or ends in .partial and does not begin like a result."""
     try:
         with open_regular(path) as file:
             start = file.read(len(KIND))
@@ -61,9 +61,9 @@ def is_block_log(path: str | os.PathLike[str]) -> bool:
 
 
 class Description(TypedDict):
-    """Description of a sweep in JSON types, so that its log can be read without the kernel."""
+    """Description of a sweep in JSON types, with which a log can be read without the kernel."""
 
-    attributes: dict[str, Any]  # those of the result
+    attributes: dict[str, Any]  # attributes of the result
     blocks: int
     size: int  # cells in a block
     dimension: int  # states of a cell
@@ -86,7 +86,7 @@ class BlockLog:
     counts: np.ndarray  # (CODES,): how many cells of the stored blocks ended with each status
     _file: FileIO = field(repr=False)
     _end: int
-    most: int = 0  # section points of the cell that has most
+    most: int = 0  # largest number of section points of a cell
     _flushed: float = field(default_factory=time.monotonic)
 
     @staticmethod
@@ -132,12 +132,12 @@ class BlockLog:
         return log
 
     def _scan(self) -> None:
-        """Find the records; new ones go behind the last one that has a sound head."""
+        """Find the records; new records are appended behind the last record with a correct head."""
         size = os.fstat(self._file.fileno()).st_size
         for offset, head, sound in _records(self._file, self._end, size):
             _, block, length, _, _, most, *statuses, _ = head
             if sound and block < len(self.places):
-                if self.places[block] >= 0:  # written twice, once before some damage: the later one counts
+                if self.places[block] >= 0:  # a block that was written twice after damage: the later record counts
                     self.counts -= self._statuses(block)
                 self.places[block] = offset
                 self.counts += np.array(statuses)
@@ -154,7 +154,7 @@ class BlockLog:
         return self.places >= 0
 
     def append(self, block: int, buffers: Buffers) -> None:
-        """Add a finished block; after an OSError the log is as before."""
+        """Append a finished block; an OSError does not change the log."""
         counts, most = tally(buffers.status), buffers.most_points
         body = _packed(buffers)
         head = HEAD.pack(MARK, block, len(body), zlib.crc32(body), len(buffers.counts), most, *counts.tolist(), 0)
@@ -170,7 +170,7 @@ class BlockLog:
             self.flush()
 
     def flush(self) -> None:
-        """Ask the system to write everything to the disk itself."""
+        """Flush all buffers of the system to the disk."""
         os.fsync(self._file.fileno())
         self._flushed = time.monotonic()
 
@@ -229,7 +229,7 @@ def _about(file: FileIO, path: str | os.PathLike[str]) -> Description:
 
 
 def _description(text: bytes, path: str | os.PathLike[str]) -> Description:
-    """Return the first line as JSON; raise ValueError if it lacks a number that the log needs."""
+    """Parse the first line as JSON; raise ValueError if a number that the log needs is missing."""
     try:
         about = json.loads(text)
     except (ValueError, RecursionError):
@@ -241,7 +241,7 @@ def _description(text: bytes, path: str | os.PathLike[str]) -> Description:
 
 
 def _records(file: FileIO, offset: int, size: int) -> Iterator[tuple[int, tuple[int, ...], bool]]:
-    """Yield the offset and the head of each record, and whether its numbers are sound; skip other bytes."""
+    """Yield offset and head of each record, and True if the checksum of its numbers is correct; skip other bytes."""
     while offset + HEAD.size <= size:
         file.seek(offset)
         raw = file.read(HEAD.size)
@@ -268,13 +268,13 @@ def _next_mark(file: FileIO, offset: int, size: int) -> int:
 
 
 def _packed(buffers: Buffers) -> bytes:
-    """Return the numbers of a block as bytes; of the section points only those that exist."""
+    """Return the numbers of a block as bytes; unused entries for section points are left out."""
     floats = (buffers.end, buffers.sums, buffers.points[_exists(buffers)], buffers.samples)
     return buffers.counts.astype("<i8").tobytes() + b"".join(part.astype("<f8").tobytes() for part in floats)
 
 
 def _exists(buffers: Buffers) -> np.ndarray:
-    """Return whether each section point exists. Shapes: returns (cells, width of the buffer)."""
+    """Return a mask of the section points that exist. Shapes: returns (cells, width of the buffer)."""
     return np.arange(buffers.points.shape[1]) < buffers.point_counts[:, None]
 
 
@@ -307,7 +307,7 @@ def _unpacked(
 
 
 def _lock(file: FileIO, path: str | os.PathLike[str]) -> None:
-    """Keep other processes from writing to the same log; the system drops the lock when the process ends."""
+    """Lock the log against other processes that write; the system releases the lock when the process ends."""
     try:
         import fcntl
     except ImportError:  # Windows

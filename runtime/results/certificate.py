@@ -1,4 +1,4 @@
-"""Certificates: exponents of the synchronous state of each cell, and the verdicts that follow."""
+"""Certificates: the exponent of the synchronous state of each cell, and the verdict on each cell."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 NEAR = 1e-11
-"""Synchronisation error below which a certified cell ends, relative to the size of the motion."""
+"""Synchronisation error, relative to the size of the motion, below which a certified cell ends."""
 
 ERRORS = 3.5
-"""Standard errors of a normal variable below 0 at which an exponent is certainly negative (a choice: a chance of 2e-4); averages
-of few blocks take as many of Student's as are equally certain.
+"""Standard errors below 0 at which an exponent is certainly negative (a choice: an error probability of 2e-4).
+
+For averages of few blocks Student's distribution replaces the normal one, at the same probability.
 """
 
 CHANCE = 1e-6
-"""Largest chance of a burst from NEAR to BURST with which a cell may end early (a choice)."""
+"""Largest probability of a burst from NEAR to BURST at which a cell may end early (a choice)."""
 
 BURST = 1e-6
-"""Synchronisation error that a certified cell must not reach again, relative to the size of the motion."""
+"""Synchronisation error, relative to the size of the motion, that counts as a burst of a certified cell."""
 
 SYNCHRONOUS = 1e-3
 """Mean error below which a cell counts as synchronous, relative to the size of the motion."""
@@ -49,9 +50,10 @@ class Certificate:
 
     @property
     def near(self) -> np.ndarray:
-        """Synchronisation error (cells,) below which a cell stays synchronous; 0 if that is not safe."""
-        # A deviation whose logarithm drifts down at the rate -exponent and diffuses ever climbs by g with the chance
-        # exp(-2 g |exponent| / diffusion): Redner, A Guide to First-Passage Processes (Cambridge, 2001), section 3.2.
+        """Synchronisation error (cells,) below which a cell stays synchronous; 0 if a burst is too probable."""
+        # The logarithm of a deviation drifts at the rate `exponent` < 0 and diffuses. The probability that it ever
+        # climbs by g is exp(-2 g |exponent| / diffusion): Redner, A Guide to First-Passage Processes (Cambridge, 2001),
+        # section 3.2.
         climb = math.log(BURST / NEAR)
         rare = -2.0 * climb * self.exponent > -math.log(CHANCE) * self.diffusion
         return np.where((self.exponent + self.margin < 0.0) & rare, NEAR * self.size, 0.0)
@@ -64,8 +66,8 @@ class Certificate:
         """Return an index into VERDICTS for each cell. Shapes (cells,): finished; mean and largest error."""
         allowed = SYNCHRONOUS * self.size
         sign = np.where(self.exponent + self.margin < 0.0, -1, np.where(self.exponent > 2 * self.stderr, 1, 0))
-        # Near the loss of stability trajectories within the synchronous state are unstable, and a small distance
-        # bursts although the exponent is negative: Ashwin, Buescu & Stewart, Phys. Lett. A 193, 126 (1994).
+        # Near the loss of stability some trajectories within the synchronous state are unstable, so small deviations
+        # burst although the exponent is negative: Ashwin, Buescu & Stewart, Phys. Lett. A 193, 126 (1994).
         together = np.where((sign < 0) & (largest >= allowed), 7, np.array([1, 2, 3])[sign + 1])
         apart = np.array([6, 5, 4])[sign + 1]
         return np.where(finished, np.where(error < allowed, together, apart), 0)

@@ -1,8 +1,8 @@
-"""Frozen values as JSON and arrays, and back: no code runs when they are read.
+"""Convert frozen values to JSON and arrays, and back; reading executes no code from the file.
 
-Numbers stand in the JSON, arrays in the dataset: an array that the labelled data hold already is
-named, any other becomes a variable of its own. A file can name only classes that occur in the types
-of the fields of its result.
+Numbers are stored in the JSON, arrays in the dataset.  The JSON refers by name to an array that is already in the
+labelled data; any other array becomes a new variable.  A file can name only classes that occur in the types of the
+fields of its result.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ T = TypeVar("T")
 
 
 def encode(value: object, data: xr.Dataset) -> tuple[Tree, Variables]:
-    """Return the fields of a frozen value as JSON types, and the arrays that `data` lack."""
+    """Return the fields of a frozen value in JSON types, and the arrays that are not in `data`."""
     writer = _Writer(data, _classes_in(type(value)))
     root = writer.tree(value, "")
     return {"root": root, "scenes": [json.loads(text) for text in writer.scenes]}, writer.arrays
 
 
 def decode(tree: Mapping[str, Any], data: xr.Dataset, kind: type[T]) -> T:
-    """Return the value of a tree; ValueError if it is of another kind."""
+    """Return the value of a JSON tree; ValueError if the value is not of the class `kind`."""
     if (name := tree["root"]["value"]) != kind.__name__:
         raise ValueError(f"it holds a {name}; expected a result of the kind {kind.__name__}")
     scenes = [Scene.from_dict(each) for each in tree["scenes"]]
@@ -52,7 +52,7 @@ def _classes_in(kind: type) -> dict[str, type]:
     while hints:
         hint = hints.pop()
         hints += get_args(hint)  # of tuple[Branch, ...], Scene | None …
-        # scenes and graphs have texts of their own
+        # skip scenes and graphs, which have separate text forms
         if isinstance(hint, type) and hint not in (Scene, Topology, classes.get(hint.__name__)):
             if issubclass(hint, Enum) or is_dataclass(hint):
                 classes[hint.__name__] = hint
@@ -62,11 +62,11 @@ def _classes_in(kind: type) -> dict[str, type]:
 
 
 class _Writer:
-    """Collects the scenes and the further arrays of a value."""
+    """Convert a value to a JSON tree; collect its scenes and the arrays that are not in the dataset."""
 
     def __init__(self, data: xr.Dataset, classes: Mapping[str, type]) -> None:
         self.data, self.classes = data, classes
-        self.scenes: dict[str, int] = {}  # number of each scene by its JSON
+        self.scenes: dict[str, int] = {}  # index of each scene, by the JSON of the scene
         self.arrays: Variables = {}
 
     def tree(self, value: Any, path: str) -> Any:
@@ -111,7 +111,7 @@ class _Writer:
 
 
 class _Reader:
-    """Makes the values of a tree."""
+    """Build values from a JSON tree."""
 
     def __init__(self, data: xr.Dataset, classes: Mapping[str, type], scenes: list[Scene]) -> None:
         self.data, self.classes, self.scenes = data, classes, scenes

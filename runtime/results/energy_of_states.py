@@ -1,4 +1,4 @@
-"""Energy and power of the states of a run, and how well a trajectory keeps the balance of the two."""
+"""Energy and power at the states of a run, and the error of the energy balance along a trajectory."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class _Group:
 
     formulas: tuple[Formula, Formula]  # energy and power as functions of (t or weight, states, parameters)
     weights: Array | None  # (count,): weights of links; None for nodes
-    states: list[Array]  # of each argument (count,): indices of states; of a link the target's, then the source's
-    parameters: list[str | list[str]]  # of each argument: name in the scene, or the names of all members
+    states: list[Array]  # for each argument (count,): indices of states; for a link first of targets, then of sources
+    parameters: list[str | list[str]]  # for each argument: one name in the scene, or a name for each member
 
     def total(self, power: bool, states: Array, t: Array, values: Mapping[str, float]) -> Array:
         """Return the sum over all members. Shapes: states (…, dimension), t (…, 1); returns (…)."""
@@ -46,9 +46,9 @@ class _Group:
 class EnergyFunction:
     """The energy of a scene's network for states (…, dimension) in the order of the equations.
 
-    All numbers are non-dimensional.  One formula for the nodes and one for the links of each kind are
-    applied to all of them at once, so that large networks and long trajectories cost array operations
-    alone.  `parameters` replace numbers of the scene by others.
+    All numbers are non-dimensional.  One formula is applied to all nodes of a kind at once, and one to all links of a
+    kind, so that large networks and long trajectories cost only array operations.  `parameters` replace parameter
+    values of the scene.
     """
 
     scene: Scene
@@ -60,18 +60,17 @@ class EnergyFunction:
         return self._sum(False, states, t, parameters)
 
     def power(self, states: Array, t: Array | float = 0.0, parameters: Values = None) -> Array:
-        """Return the power (…) that forces and the explicit time feed into the network."""
+        """Return the power (…) that forces and the explicit time dependence feed into the network."""
         return self._sum(True, states, t, parameters)
 
     def imbalance(self, t: Array, states: Array, parameters: Values = None) -> Array:
         """Return E(t) - E(t_0) - (integral of the power) of a trajectory: states (samples,
         dimension) at times t (samples).
 
-        The integral is a quadrature, Simpson's rule on the samples.  Where the power is smooth, its
-        own error falls with the third power of their distance, at every other sample with the fourth;
-        where the power jumps, as with `sign` in a force, with the first alone.  The mean of the power
-        as an observable of the run is as exact as its `rtol` (docs/models.md).  Raises ValueError for
-        fewer than three samples.
+        The integral is computed by Simpson's rule on the samples.  For a smooth power the error of the quadrature falls
+        with the third power of the sampling interval, and at every other sample with the fourth.  For a power that
+        jumps, as with `sign` in a force, the error falls with the first power.  For the accuracy of `rtol` record the
+        mean of the power as an observable of the run (docs/models.md).  Raises ValueError for fewer than three samples.
         """
         if np.ndim(t) != 1 or len(t) < 3:
             raise ValueError(f"imbalance: found {np.size(t)} samples; expected at least three; raise samples")
@@ -119,7 +118,7 @@ def energy_function(scene: Scene) -> EnergyFunction:
 
 
 def _names(equations: Equations, symbols: Sequence[sp.Symbol], nodes: Sequence[int]) -> list[str | list[str]]:
-    """Return the name of each parameter of some nodes, or a name for each node if they differ."""
+    """Return for each parameter one name for all `nodes`, or a list with a name for each node."""
     return [[f"{s.name}_{i + 1}" for i in nodes] if s.name in equations.varied else s.name for s in symbols]
 
 

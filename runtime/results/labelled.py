@@ -26,9 +26,9 @@ KIND, VALUE = "kind", "value"
 class Labelled(HasPlot):
     """A frozen value with `data`, `summary`, `as_dict`, `plot` and `save`.
 
-    A subclass is a frozen dataclass that defines `data` and `summary`.  Its fields are written and
-    read by `synchain.runtime.results.codec` by their types, so a subclass has no reader or writer of
-    its own.  `open_result` finds it by its public name in `synchain.runtime`.
+    A subclass is a frozen dataclass that defines `data` and `summary`.  `synchain.runtime.results.codec` writes and
+    reads the fields by their types, so a subclass needs no reader or writer.  `open_result` finds a subclass by its
+    public name in `synchain.runtime`.
     """
 
     __slots__ = ()
@@ -55,7 +55,7 @@ class Labelled(HasPlot):
         return as_json({str(name): variable.values for name, variable in self.data.variables.items()})
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-        """Write a file that opens in xarray and in `open_result`; it appears whole or not at all.
+        """Write a file for `open_result` and xarray; the file is written completely or not at all.
 
         Parameters
         ----------
@@ -63,14 +63,14 @@ class Labelled(HasPlot):
             Its ending chooses the form: .nc is netCDF-3, .nc4 netCDF-4 (needs h5netcdf), .zarr a Zarr
             folder (needs zarr).
         overwrite : bool
-            Replace what is there already.
+            Replace an existing file.
 
         Raises
         ------
         ValueError
             For another ending.
         FileExistsError
-            If a file is there and `overwrite` is not given.
+            If the file exists and `overwrite` is False.
         ModuleNotFoundError
             If the package of the form is not installed.
         OSError

@@ -1,4 +1,4 @@
-"""Names of a kernel's numbers in a result: variables of any of its cells, coordinates, provenance."""
+"""Label the numbers of a kernel: variables of any cells of a result, coordinates, provenance."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ STATE = ("component", "node")
 """The dimensions of a state."""
 
 START_STATE = "start_state"
-"""Variable of the initial states of the cells, if they are not the scene's."""
+"""Variable of the initial states of the cells, if these differ from the initial states of the scene."""
 
 END_TIME, DRIVE_PHASE = "end_time", "drive_phase"
 """Coordinates of each cell: the time at which it stopped, and the phase of the drive there, from 0 to 1."""
 
 TIMES = ("time", "section_time", END_TIME, DRIVE_PHASE)
-"""Variables that are coordinates of others."""
+"""Variables that are coordinates of other variables."""
 
 TEXTS = ("scene", "title", "equations", "kernel", "versions")
 """Attributes of a result that are text."""
@@ -77,12 +77,12 @@ DIMENSIONLESS = frozenset(
         "section_time", "time", "transversal_exponent", "transversal_stderr", "rtol_used",
     }
 )  # fmt: skip
-"""Variables with the unit "1" in any model: counts, non-dimensional times and rates per unit of them.
+"""Variables with the unit "1" in every model: counts, non-dimensional times, and rates per non-dimensional time.
 
-States and errors have the units of the model; only a model with a scaling makes them dimensionless."""
+States and errors have the units of the model and are dimensionless only in a model with a scaling."""
 
 SCALED = frozenset({"end", "section", "trajectory", "sync_error", "sync_error_max", "sync_error_end"})
-"""States, and distances of states."""
+"""Variables that are states or distances of states."""
 
 COUNTS = {
     "status": Count.STATUS,
@@ -97,10 +97,10 @@ SUMS = {
     "sync_error_end": SumColumn.LAST,
     "end_time": SumColumn.STOPPED_AT,
 }
-"""The columns of `counts` and of `sums` by the names of their variables."""
+"""The column of `counts` or `sums` of each variable."""
 
 TOLERANCES = ("rtol_used", "atol_used")
-"""The names of the columns of `Buffers.tolerances`."""
+"""Names of the variables of the columns of `Buffers.tolerances`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,13 +153,13 @@ def variables(
         by_method = buffers.counts[:, Count.BY_METHOD : Count.BY_METHOD + len(method_names(scene))]
         yield "methods", (), ((by_method > 0) @ _masks(scene)).astype(np.int32)
         yield "method_steps", ("integrator",), by_method.astype(np.int32)
-    # Where it stopped: the phase is NaN if the drive has no period, and 0 without a drive.
+    # Where the cell stopped: the phase is NaN if the drive has no period, and 0 without a drive.
     states = States.of(scene)
     yield "end", STATE, states.table(buffers.end)
     yield END_TIME, (), stopped
     period = np.where(spans[:, SpanColumn.PERIOD] > 0.0, spans[:, SpanColumn.PERIOD], np.nan)
     yield DRIVE_PHASE, (), np.mod(stopped / period, 1.0) if scene.forced else np.zeros(len(spans))
-    # Averages over the window; there are none in a cell that failed before it.
+    # Averages over the window; NaN in a cell that failed before the window.
     if "sync_error" in scene.record:
         unseen = (buffers.status != Status.FINISHED) & (stopped <= spans[:, SpanColumn.START])
         for name in ("sync_error", "sync_error_max"):
@@ -176,7 +176,7 @@ def variables(
         if "sync_error" in scene.record:
             mean, peak = buffers.sums[:, SumColumn.MEAN], buffers.sums[:, SumColumn.PEAK]
             yield "verdict", (), certificate.verdicts(finished, mean, peak).astype(np.int32)
-    # Points of sections, NaN behind a cell's last one, and samples of the window.
+    # Section points, with NaN after the last point of a cell, and samples of the window.
     if "section" in scene.record:
         points = np.full((len(spans), max(most, 1), buffers.points.shape[2]), np.nan)
         width = min(most, buffers.points.shape[1])
@@ -219,12 +219,12 @@ def _flags(meanings: Mapping[int, str]) -> dict[str, object]:
 
 
 def _scaled(scene: Scene) -> bool:
-    """Return whether all oscillators are made non-dimensional by their scales."""
+    """Return True if the scalings of all oscillators make their states non-dimensional."""
     return all(getattr(kind.oscillator.model, "scaling", None) is not None for kind in scene.model.kinds)
 
 
 def meaning(scene: Scene, name: str) -> str:
-    """Return the meaning of a variable of a result as text; of an observable its expression."""
+    """Return the meaning of a variable of a result as text; for an observable its expression."""
     if name in scene.observe:
         return str(scene.observe[name])
     if name == "status":
@@ -234,13 +234,13 @@ def meaning(scene: Scene, name: str) -> str:
 
 
 def dimensions(scene: Scene) -> tuple[str, ...]:
-    """Return the dimensions of a sweep: the names of its axes, or "cell" if they are zipped; then "realisation"."""
+    """Return the dimensions of a sweep: the names of the axes, or "cell" for zipped axes; then "realisation"."""
     axes = ("cell",) if scene.zipped else tuple(axis.name for axis in scene.axes)
     return (*axes, "realisation") if scene.realisations else axes
 
 
 def coordinates(scene: Scene) -> dict[str, Any]:
-    """Return the coordinates of a result: the axes, the components, the numbers of the nodes, and what sections keep."""
+    """Return the coordinates of a result: axes, components, numbers of nodes, and expressions stored by sections."""
     coords: dict[str, Any] = {"component": list(scene.equations.components), "node": list(scene.topology.labels)}
     coords |= {"integrator": list(method_names(scene))} if scene.integrator == "auto" else {}
     coords |= {f"{name}_kept": list(section.keep) for name, section in scene.sections.items() if section.keep}
@@ -305,20 +305,20 @@ def scene_of(attributes: Mapping[str, Any]) -> Scene:
 
 
 def alike(first: Scene, second: Scene) -> bool:
-    """Return whether two scenes differ at most in their titles and in the text of files of code that they name."""
+    """Return True if two scenes differ at most in their titles and in the contents of files of code."""
     one, other = first.replace(title=""), second.replace(title="")
     return one == other or one.as_dict() == other.as_dict()
 
 
 def changed(attributes: Mapping[str, Any], scene: Scene) -> bool:
-    """Return whether the code behind the names of a scene's parts has changed since the result was computed."""
+    """Return True if the code of a part of the scene has changed since the result was computed."""
     return "model" in attributes and attributes["model"] != scene.equations.digest
 
 
 def provenance(
     scene: Scene, kernel: Kernel, skipped: tuple[str, ...], versions: str, processor: str
 ) -> dict[str, object]:
-    """Return the origin of a result as its attributes; `skipped` lists what was left out of the equations."""
+    """Return the provenance of a result as attributes; `skipped` lists the parts left out of the equations."""
     return {
         "title": scene.title or repr(scene),
         "scene": json.dumps(scene.as_dict()),

@@ -1,4 +1,4 @@
-"""Opening the files of results of every kind, finished or not."""
+"""Open files of results of every kind, from finished and unfinished runs."""
 
 from __future__ import annotations
 
@@ -21,35 +21,34 @@ from .store import read_data
 
 
 def open_result(path: str | os.PathLike[str]) -> Labelled:
-    """Read the file of a result of any kind, or the cells so far of a run that is not finished.
+    """Read the file of a result of any kind, or the finished cells of an unfinished run.
 
     Parameters
     ----------
     path : str or path
-        A file written by the `save` of any result or by `stream`, or the file ".partial" beside it
-        while a run is not finished.
+        A file written by `save` of any result or by `stream`, or the file with the ending ".partial" of an unfinished
+        run.
 
     Returns
     -------
     Result, MSF, Thresholds …
-        The value that was saved.  Of an unfinished run all cells; those that have not ended have
-        the status NOT_RUN.
+        The saved value.  For an unfinished run a `Result` of all cells, in which cells that have not ended have the
+        status NOT_RUN.
 
     Raises
     ------
     OSError, ValueError
-        If the file is none of these or if it is damaged.
+        If the file is of another kind or damaged.
     ModuleNotFoundError
         If the file needs a package that is not installed.
 
     Warns
     -----
     RuntimeWarning
-        If the file has no digest because another program or an earlier version wrote it: damage
-        cannot be seen.
+        If the file has no digest, because another program or an earlier version wrote it; damage cannot be detected.
     UserWarning
-        If the code of the model has changed since: the numbers are those of the former model, the
-        scene names the present one.
+        If the code of the model has changed since the run: the numbers belong to the former model, the scene to the
+        present model.
 
     See Also
     --------
@@ -60,7 +59,7 @@ def open_result(path: str | os.PathLike[str]) -> Labelled:
     if is_block_log(path):
         return _warned(read_partial(path), path)
     data = read_data(path)
-    if KIND not in data.attrs:  # the data of a sweep are a result as they are
+    if KIND not in data.attrs:  # the file of a sweep: the dataset itself is the result
         return _warned(result_of(data, path), path)
     with understood(path):
         tree, kind = json.loads(data.attrs[VALUE]), data.attrs[KIND]
@@ -68,7 +67,7 @@ def open_result(path: str | os.PathLike[str]) -> Labelled:
 
 
 def _class_of(kind: str) -> type[Labelled]:
-    """Return the result class of a public name of the runtime, which imports its module on first use."""
+    """Return the result class of a public name of `synchain.runtime`, which imports the module on first use."""
     found = getattr(import_module("synchain.runtime"), kind, None)
     if not isinstance(found, type) or not issubclass(found, Labelled):
         raise ValueError(f"it holds a {kind}; expected a result")

@@ -1,6 +1,4 @@
-"""Results out of the blocks of a sweep on disk: of the cells so far in memory, or of all cells in a
-file.
-"""
+"""Build results from the blocks of a sweep on disk: the finished cells in memory, or all cells in a file."""
 
 from __future__ import annotations
 
@@ -79,7 +77,7 @@ def certificate_of(about: Description) -> Certificate | None:
 
 
 class _BlockReader:
-    """Reads the blocks of a log, expanded from the reduced to the whole network."""
+    """Read the blocks of a log, and expand each from the reduced to the whole network."""
 
     def __init__(self, log: BlockLog, scene: Scene, most: int | None = None) -> None:
         about = log.about
@@ -103,11 +101,11 @@ class _BlockReader:
 
 
 def read_partial(path: str | os.PathLike[str]) -> Result:
-    """Return the cells so far of a sweep on disk; the others have the status NOT_RUN."""
+    """Return the finished cells of a sweep on disk; all other cells have the status NOT_RUN."""
     with understood(Path(path)):
         about = BlockLog.describe(path)
         scene = scene_of(about["attributes"])
-        layout_of(about, scene)  # refuse a wrong description before all records are read
+        layout_of(about, scene)  # raises ValueError for a wrong description, before all records are read
         with closing(BlockLog.open(path)) as log:
             reader = _BlockReader(log, scene)
             dimension, samples = len(reader.merge.places), int(about["samples"])
@@ -126,16 +124,16 @@ def read_partial(path: str | os.PathLike[str]) -> Result:
 
 
 def write_result(logs: Iterable[BlockLog], path: str | os.PathLike[str], scene: Scene, most: int) -> dict[str, int]:
-    """Write the result of logs that hold each block once, one block in memory at a time; count the verdicts.
+    """Write the result of logs that together contain each block once; return the number of cells by verdict.
 
-    The first log holds block 0; a cell has at most `most` section points. The ending of `path` chooses the form of
-    the file.
+    One block is in memory at a time.  The first log contains block 0; a cell has at most `most` section points.  The
+    ending of `path` chooses the format of the file.
     """
     following = iter(logs)
     first_log = next(following)
     reader = _BlockReader(first_log, scene, most)
     verdicts: dict[str, int] = {}
-    # The first cell alone has all variables: the file is that, but for the lengths of the axes.
+    # The dataset of the first cell has all variables: it is the template of the file, except the lengths of the axes.
     first = Buffers(*(array[:1] for array in reader.buffers(0).arrays()))
     arrays = reader.variables(np.arange(1), first)
     template = labelled(scene, arrays, (1,) * len(scene.shape), first_log.about["attributes"])

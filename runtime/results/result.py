@@ -1,4 +1,4 @@
-"""The labelled result of a run: numbers, their meaning, and how they came about."""
+"""The labelled result of a run: the numbers, their meaning and their provenance."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ if TYPE_CHECKING:
 
 
 class _Deferred:
-    """Holds the function that computes the labelled data of a result on first use.
+    """Hold the function that computes the labelled data of a result on first use.
 
-    A base class, since the slots of a dataclass are its fields alone.
+    This is a base class because the slots of a dataclass are only its fields.
     """
 
     __slots__ = ("_make",)
@@ -59,21 +59,20 @@ class _Deferred:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Result(_Deferred, HasAnimation, Labelled):
-    """Labelled arrays of a run, which reads like its `xarray.Dataset`.
+    """Labelled arrays of a run, with the interface of an `xarray.Dataset`.
 
-    A variable is an item and an attribute: ``result["sync_error"]`` and ``result.sync_error`` are the
-    same array.  `sel`, `isel`, `to_dataframe`, iteration and ``in`` are those of the dataset; its other
-    methods are reached by `data`.
+    A variable is an item and an attribute: ``result["sync_error"]`` and ``result.sync_error`` are the same array.
+    `sel`, `isel`, `to_dataframe`, iteration and ``in`` act on the dataset.  Call other methods of the dataset on
+    `data`.
 
     Attributes
     ----------
     data : xarray.Dataset
-        Its dimensions are the names of the axes (or "cell" if the axes are zipped), then "sample" or
-        "point" of a record, then "component" and "node" of a state: `result.end.sel(component="v",
-        node=3)`.  A state that a node of another kind does not have is NaN.  The times of samples
-        and points are the coordinates `time` and `section_time`.  Its attributes hold the scene, the
-        versions and the processor that made the result, those of a variable its meaning, its units
-        and the meanings of its codes by the CF conventions.
+        The dataset.  Its dimensions are the names of the axes (or "cell" if the axes are zipped), then "sample" or
+        "point" of a record, then "component" and "node" of a state: `result.end.sel(component="v", node=3)`.  A state
+        that a node lacks is NaN.  The times of samples and points are the coordinates `time` and `section_time`.  The
+        attributes of the dataset are the scene, the versions and the processor.  The attributes of a variable are its
+        meaning, units and the meanings of its codes, by the CF conventions.
     scene : Scene
         The scene, with its axes.
 
@@ -115,7 +114,7 @@ class Result(_Deferred, HasAnimation, Labelled):
 
     @classmethod
     def _deferred(cls, make: Callable[[], xr.Dataset], scene: Scene) -> Result:
-        """Return a result whose data are made when they are first read: labels take longer than a short run."""
+        """Return a result whose data are built at the first access: building labels takes longer than a short run."""
         result = cls.__new__(cls)
         object.__setattr__(result, "_make", make)
         object.__setattr__(result, "scene", scene)
@@ -125,7 +124,7 @@ class Result(_Deferred, HasAnimation, Labelled):
         if name == "_make":
             raise AttributeError(name)
         if name == "data":
-            # `_make` stays: two threads may read `data` at the same time
+            # keep `_make`: two threads may read `data` at the same time
             data: Any = self._make()
             object.__setattr__(self, "data", data)
             object.__setattr__(self, "_make", lambda: data)
@@ -135,7 +134,7 @@ class Result(_Deferred, HasAnimation, Labelled):
         return self.data[name]
 
     def _refusal(self, name: object) -> str:
-        """Return the message about a name that is no variable."""
+        """Return the error message for a name that is no variable."""
         names = ", ".join(sorted(map(str, self.data.data_vars)))
         text = f"this result has no {name!r}; it has: {names}"
         method = isinstance(name, str) and not name.startswith("_") and hasattr(xr.Dataset, name)
@@ -163,7 +162,7 @@ class Result(_Deferred, HasAnimation, Labelled):
         indexers : mapping, optional
             Values, lists or slices of values by the names of dimensions.
         **more
-            The same as keywords; `method="nearest"` takes the nearest value, at most `tolerance` away.
+            The indexers as keywords; `method="nearest"` selects the nearest value, at most `tolerance` away.
 
         Returns
         -------
@@ -196,7 +195,7 @@ class Result(_Deferred, HasAnimation, Labelled):
         indexers : mapping, optional
             Integers, lists or slices of integers by the names of dimensions, counted from 0.
         **more
-            The same as keywords.
+            The indexers as keywords.
 
         Returns
         -------
@@ -277,7 +276,7 @@ class Result(_Deferred, HasAnimation, Labelled):
             cells = set(dimensions(self.scene))
             names = [str(name) for name, values in self.data.items() if set(values.dims) <= cells]
         chosen: xr.Dataset = self[[names] if isinstance(names, str) else list(names)]
-        # Coordinates of records, such as the times of samples, would add their dimensions.
+        # Drop coordinates of records, such as times of samples, which would add the dimensions of the record.
         used = {str(dim) for values in chosen.values() for dim in values.dims}
         chosen = chosen.drop_vars([name for name, values in chosen.coords.items() if not set(values.dims) <= used])
         return (chosen if used else chosen.expand_dims("cell")).to_dataframe()
@@ -314,7 +313,7 @@ class Result(_Deferred, HasAnimation, Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """The scene, the cells and how they ended, the variables."""
+        """Rows of the summary: scene, cells by status, variables."""
         sizes = ", ".join(f"{name} {size}" for name, size in self.data.sizes.items())
         cells = self.scene.cells
         return (
@@ -348,8 +347,8 @@ class Result(_Deferred, HasAnimation, Labelled):
             * end: final states
             * the name of an observable: its value over an axis
         windows : sequence of Window, optional
-            Intervals of the coupling strength that are shaded behind the curve, such as
-            ``msf(…).windows``: where a prediction says that the network synchronises.
+            Intervals of the coupling strength, shaded behind the curve: predicted ranges of synchronisation, such as
+            ``msf(…).windows``.
         **style
             Keywords of the Matplotlib artist, such as `color`, `linewidth`, `cmap`.
 
@@ -374,7 +373,7 @@ class Result(_Deferred, HasAnimation, Labelled):
         return HasPlot.plot(self, ax, kind=kind, windows=windows, **style)
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-        """Write the data as they are: a result is its dataset (see `Labelled.save` for the forms)."""
+        """Write the dataset of the result to a file (see `Labelled.save` for the formats)."""
         write_data(self.data, path, overwrite)
 
     def states(self, name: str = "end") -> np.ndarray:
@@ -386,11 +385,11 @@ class Result(_Deferred, HasAnimation, Labelled):
         return States.of(self.scene).flat(self.data[check_choice("variable of states", name, names)].values)
 
     def belongs_to(self, scene: Scene) -> bool:
-        """Return whether the scene is this result's but for its title."""
+        """Return True if the scene equals the scene of this result, apart from the title."""
         return alike(self.scene, scene)
 
     def stepped(self, equations: Equations) -> bool:
-        """Return whether these equations were integrated: the scene's, reduced or not."""
+        """Return True if this result was computed by integrating `equations` (of the scene, reduced or not)."""
         return bool(self.data.attrs["equations"] == equations.digest)
 
     def restore(self, scene: Scene, buffers: Buffers, equations: Equations) -> None:
@@ -408,8 +407,8 @@ class Result(_Deferred, HasAnimation, Labelled):
         Raises
         ------
         ValueError
-            If the scenes differ in more than their titles, or if this result comes of other
-            equations or of another kind of processor.
+            If the scenes differ in more than their titles, or if this result was computed from other equations or on
+            another kind of processor.
         """
         if not self.belongs_to(scene):
             raise ValueError("the result to resume belongs to another scene; run without resume")
@@ -471,7 +470,7 @@ def read_result(path: Path) -> Result:
 
 
 def result_of(data: xr.Dataset, path: Path) -> Result:
-    """Return the result of the data of a file; raise ValueError if they are not those of a result."""
+    """Return the result of a dataset from a file; raise ValueError if the dataset is not of a result."""
     with understood(path):
         scene = scene_of(data.attrs)
         status = data.get("status")

@@ -1,9 +1,9 @@
 """Files of labelled data: netCDF-3 without further packages, netCDF-4 and Zarr if their packages are installed.
 
-A file appears whole or not at all, and carries a digest by which damage is seen: netCDF-3 that of its
-bytes, the other forms that of their contents.  It is written at once, or filled row by row with few
-rows in memory.  Rows have fixed places in netCDF-3 alone: the other forms, whose chunks are
-compressed whole, are copied from such a file beside them, chunk by chunk.
+A file is written completely or not at all.  A digest in the file reveals damage: of the bytes for netCDF-3, of the
+contents for the other formats.  A file is written at once, or row by row with few rows in memory.  Only in netCDF-3 do
+rows have fixed offsets.  The other formats compress whole chunks, so such a file is copied chunk by chunk from a
+temporary netCDF-3 file.
 """
 
 from __future__ import annotations
@@ -34,31 +34,31 @@ PARTS = ("real", "imaginary")
 """The values of the dimension `part`, by which complex numbers are stored as pairs of real ones."""
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Errors of a system that has no room for a file."""
+"""System errors for a full disk, an exhausted quota and a too large file."""
 
 CHUNK = 2**15
-"""Numbers of a chunk, 256 kB of doubles, which are in memory together."""
+"""Numbers of a chunk (256 kB of doubles); one chunk is in memory at a time."""
 
 Copy: TypeAlias = "Callable[[xr.Dataset, Path, Collection[str]], None]"
-"""Writes a dataset to a path: variables with one of these dimensions chunk by chunk, others at once."""
+"""Function that writes a dataset to a path: variables with one of the dimensions chunk by chunk, others at once."""
 
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """Functions that write and read one form of files."""
+    """Functions that write and read one format of files."""
 
-    package: str | None  # package needed besides the dependencies of this one
-    check: Callable[[Path], None]  # raise OSError if a file of this form cannot replace what a path has
+    package: str | None  # package needed besides the dependencies of synchain
+    check: Callable[[Path], None]  # raise OSError if a path exists and cannot be replaced
     whole: Callable[[Path], AbstractContextManager[Path]]  # yield a temporary path, then move it to the path
     write: Callable[[xr.Dataset, Path], None]  # write a dataset to a path, without its digest
-    # yield the sheet of a new file: like a template but for the lengths of some dimensions
+    # yield the sheet of a new file: the template with other lengths of some dimensions
     rows: Callable[[xr.Dataset, Mapping[str, int], Path], AbstractContextManager[Sheet]]
     seal: Callable[[Path], None]  # write the digest of a file into it
-    open: Callable[[Path], xr.Dataset]  # return the lazily read data of a file whose digest fits
+    open: Callable[[Path], xr.Dataset]  # verify the digest and return the dataset, which is read lazily
 
 
 def form_of(path: str | os.PathLike[str]) -> Form:
-    """Return the form that belongs to the ending of a path; raise ModuleNotFoundError without its package."""
+    """Return the format for the ending of a path; raise ModuleNotFoundError if its package is missing."""
     ending = check_path("path", path).suffix.lower()
     if ending not in FORMS:
         raise ValueError(f"path: found {os.fspath(path)!r}; expected a name that ends in {' or '.join(FORMS)}")
@@ -96,14 +96,14 @@ def write_data(data: xr.Dataset, path: str | os.PathLike[str], overwrite: bool =
 
 @contextmanager
 def filled(path: str | os.PathLike[str], template: xr.Dataset, lengths: Mapping[str, int]) -> Iterator[Sheet]:
-    """Yield the empty variables of a new file; the file appears at the end of the with block."""
+    """Yield the empty variables of a new file, which is moved to its path at the end of the with block."""
     with _new(path) as (form, temporary), form.rows(_without_complex(template), lengths, temporary) as rows:
         yield rows
 
 
 @contextmanager
 def _new(path: str | os.PathLike[str]) -> Iterator[tuple[Form, Path]]:
-    """Yield the form of a path and a temporary path; then seal that file, flush it to the disk and move it."""
+    """Yield the format of a path and a temporary path; then write the digest, flush the file and move it."""
     form, target = form_of(path), Path(path)
     form.check(target)
     with form.whole(target) as temporary:
@@ -114,7 +114,7 @@ def _new(path: str | os.PathLike[str]) -> Iterator[tuple[Form, Path]]:
 
 @contextmanager
 def opened(path: Path) -> Iterator[xr.Dataset]:
-    """Yield the open data of a file, which are read lazily."""
+    """Yield the open dataset of a file, which is read lazily."""
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist; expected a result: check the path")
     form = form_of(path) if path.suffix.lower() in FORMS else FORMS[".nc"]
@@ -125,7 +125,7 @@ def opened(path: Path) -> Iterator[xr.Dataset]:
 def read_data(path: Path) -> xr.Dataset:
     """Return the dataset of a file in memory, without its digest; raises as `opened`."""
     with opened(path) as file, _readable(path):
-        data = file.load().drop_encoding()  # the next file chooses its own encoding
+        data = file.load().drop_encoding()  # so that a later file can choose another encoding
     data.attrs = attributes_of(data.attrs, path)
     return _with_complex(data)
 
@@ -181,7 +181,7 @@ def _open_netcdf3(path: Path) -> xr.Dataset:
             kind = "an HDF5 or netCDF4 file" if start == b"\x89HDF" else "no netCDF file"
             raise OSError(f"{path} is {kind}; expected a netCDF 3 result, as Result.save and stream write it")
         sealed = is_sealed(file)
-    if sealed is False:  # checked before the header is used
+    if sealed is False:  # verify the digest before using the header
         raise _damaged(path, "bytes")
     with _readable(path):
         data = xr.open_dataset(path, engine="scipy")
@@ -229,8 +229,7 @@ def _open_netcdf4(path: Path) -> xr.Dataset:
     import h5py
 
     open_regular(path).close()
-    # h5netcdf reads this attribute before its File can be closed, and a damaged one leaves a traceback on stderr:
-    # read it here first.
+    # Read this attribute before h5netcdf does: there a damaged attribute leaves an open file and a traceback on stderr.
     with _readable(path), h5py.File(path, "r") as file:
         file.attrs.get("_nc3_strict")
     return _intact(path, "h5netcdf")
@@ -269,7 +268,7 @@ def _seal_zarr(path: Path) -> None:
 
 
 def _by_way_of_netcdf3(copy: Copy) -> Callable[..., AbstractContextManager[Sheet]]:
-    """Return how to fill files whose rows have no fixed offsets: fill a netCDF-3 file beside them, then copy it."""
+    """Return the `rows` function of a format without fixed offsets: fill a temporary netCDF-3 file, then copy it."""
 
     @contextmanager
     def rows(template: xr.Dataset, lengths: Mapping[str, int], path: Path) -> Iterator[Sheet]:
@@ -329,7 +328,7 @@ def _lazy(path: Path, engine: str) -> xr.Dataset:
 
 
 def _intact(path: Path, engine: str) -> xr.Dataset:
-    """Open a file whose contents fit their digest, or that has none."""
+    """Open a file; raise OSError if the contents do not match the digest, if there is one."""
     with _readable(path):
         data = _lazy(path, engine)
         fits = data.attrs.get(DIGEST, "") in ("", _digest(data))
@@ -345,7 +344,7 @@ def _digest_of(path: Path, engine: str) -> str:
 
 
 def _digest(data: xr.Dataset) -> str:
-    """Return the SHA-256 of names, dimensions, values and attributes, the same for every form of files."""
+    """Return the SHA-256 of names, dimensions, values and attributes, which is the same for every format."""
     total = hashlib.sha256()
     for name in sorted(map(str, data.variables)):
         variable = data.variables[name]
@@ -404,4 +403,4 @@ FORMS: dict[str, Form] = {
         lambda path: _intact(path, "zarr"),
     ),
 }
-"""The forms by the endings that choose them."""
+"""The format of each ending."""

@@ -1,1 +1,1 @@
-"""Files, threads, progress, status codes and checks of arrays. Knows no scene."""
+"""Files, threads, progress, status codes and checks of arrays. Imports no scene."""

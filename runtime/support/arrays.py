@@ -1,4 +1,4 @@
-"""Checks of arrays from the user: finite numbers, in one row and, if asked for, rising."""
+"""Check arrays from the user: finite numbers, in one row, and optionally rising."""
 
 from __future__ import annotations
 

@@ -11,14 +11,14 @@ if TYPE_CHECKING:
     import numpy as np
 
 LONGEST = 15
-"""Most decimals that are written out; a smaller number has an exponent."""
+"""Most decimals of a number; a smaller number is written with an exponent."""
 
 
 def with_error(value: float, error: float = 0.0) -> str:
     """Return a number with its error: the error to two significant digits, the value to the same decimal place.
 
-    A number without an error has four decimals, or four digits if it is smaller than 0.001; so has one whose error is below
-    its rounding.  An error that is infinite or nan is "unknown".  Zero has no sign.
+    A number without an error has four decimals, or four digits if smaller than 0.001.  The same holds for a number with
+    an error below its rounding.  An infinite or nan error is written as "unknown".  Zero has no sign.
 
     >>> with_error(0.17722, 5.2e-4), with_error(0.3), with_error(4e-6), with_error(0.3, math.inf)
     ('0.17722 ± 0.00052', '0.3000', '4e-06', '0.3000 ± unknown')
@@ -30,7 +30,7 @@ def with_error(value: float, error: float = 0.0) -> str:
         return f"{with_error(value)} ± unknown"
     if error <= sys.float_info.epsilon * abs(value):
         return f"{value:z.4f}" if value == 0.0 or abs(value) >= 1e-3 else f"{value:.4g}"
-    # the decimal place of the error's second digit, after rounding: 0.0996 is 0.10
+    # find the decimal place of the second digit of the error after rounding: 0.0996 is 0.10
     rounded = f"{error:.1e}"
     digits = 1 - int(rounded.partition("e")[2])
     if digits > LONGEST:
@@ -48,7 +48,8 @@ def interval_text(
 ) -> str:
     """Return intervals as "low … high; low … high" with the errors of their ends, or "none".
 
-    Dots follow an end that is an end of the grid: the interval may go on.  A lower end at 0 has none: couplings begin there.
+    An end in `grid_ends` is followed by dots, since the interval may continue beyond the grid.  A lower end at 0 has no
+    dots, since couplings begin at 0.
     """
 
     def end(value: float, error: float, lower: bool) -> str:

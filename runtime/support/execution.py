@@ -1,4 +1,4 @@
-"""Threads or an executor for a call, and its reports of progress."""
+"""Options of a call: threads or an executor, and reports of progress."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .threads import worker_count
 
 @dataclass(frozen=True, slots=True)
 class Execution:
-    """Threads or an executor for a call, and its reports of progress; checked."""
+    """Checked options of a call: threads or an executor, and reports of progress."""
 
     workers: int | None = None  # number of threads (default: all cores)
     executor: Executor | None = None  # runs the blocks in place of threads (docs/scale.md)
@@ -33,7 +33,7 @@ class Execution:
         object.__setattr__(self, "size", _size(self.executor, self.workers))
 
     def reporter(self, total: float, unit: str = "cell") -> Reporter:
-        """Return the reporter of a number of cells, periods or values; its time begins now."""
+        """Return a reporter for a number of cells, periods or values; the clock of the reporter starts now."""
         return Reporter(total, self.show_progress, self.progress, unit)
 
 

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Write files completely or not at all."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 @contextmanager
 def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary folder beside `path`, as `whole_file` does; delete a former folder in the end."""
+    """Yield a temporary folder beside `path`, and move it there as `whole_file` does; delete an existing folder."""
     target = Path(path)
     with _cannot_write(target):
         name = tempfile.mkdtemp(dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix)
@@ -50,7 +50,7 @@ def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def synced(path: Path) -> None:
-    """Ask the system to write a file, or all files of a folder, to the disk itself."""
+    """Flush a file, or all files of a folder, from buffers of the system to the disk."""
     for part in (path, *path.rglob("*")):
         if part.is_file():
             with open(part, "rb+") as file:
@@ -59,7 +59,7 @@ def synced(path: Path) -> None:
 
 @contextmanager
 def _cannot_write(target: Path) -> Iterator[None]:
-    """Name the target in an error of the system, with a remedy."""
+    """Turn a system error into a message that names the target and a remedy."""
     try:
         yield
     except OSError as problem:
@@ -68,7 +68,7 @@ def _cannot_write(target: Path) -> Iterator[None]:
 
 @contextmanager
 def _named(target: Path, temporary: str) -> Iterator[None]:
-    """Make an error of the system name the file of the user instead of none or a temporary one."""
+    """Put the name of the user's file into a system error, in place of no name or a temporary name."""
     try:
         yield
     except OSError as problem:
@@ -86,7 +86,7 @@ def check_replaceable(target: Path) -> None:
 
 
 def drop_leftovers(path: str | os.PathLike[str]) -> None:
-    """Delete temporary files of processes that were killed while they wrote `path`; no other may be writing it."""
+    """Delete temporary files of killed processes that wrote `path`; call only if no process is writing `path`."""
     target = Path(path)
     for leftover in target.parent.glob(f".{escape(target.stem)}-*{escape(target.suffix)}"):
         if leftover.is_dir():
@@ -97,12 +97,12 @@ def drop_leftovers(path: str | os.PathLike[str]) -> None:
 
 @contextmanager
 def understood(path: Path) -> Iterator[None]:
-    """Turn any error that a forged file causes in its reader into one ValueError that names the file."""
+    """Turn any error of a reader, as from a forged file, into one ValueError that names the file."""
     try:
         yield
     except (OSError, MemoryError):
         raise
-    except Exception as problem:  # forged contents may break anything
+    except Exception as problem:  # forged contents may raise any exception
         message = " ".join(str(problem).split()) or type(problem).__name__
         raise ValueError(message if str(path) in message else f"cannot use {path}: {message}") from problem
 

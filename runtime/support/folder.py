@@ -1,4 +1,4 @@
-"""The modules of a folder, one for each thing that a user can name: commands, benchmarks, peers."""
+"""List and import the modules of a folder that has one file for each command, benchmark or figure."""
 
 from __future__ import annotations
 

@@ -1,9 +1,8 @@
-"""A netCDF file written piece by piece: as large as the disk, with one piece in memory.
+"""Write a netCDF file piece by piece: as large as the disk, with one piece in memory.
 
-The bytes are those that SciPy writes for `Result.save`, a netCDF "64-bit offset" file: the header has
-the offset of each variable, then the variables follow, big endian (NetCDF Classic Format
-Specification, Unidata). The first attribute of a result is a digest of the file, computed with zeros
-in place of the digest itself.
+The bytes equal the file that SciPy writes for `Result.save`, a netCDF "64-bit offset" file.  The header contains the
+offset of each variable; the variables follow, big endian (NetCDF Classic Format Specification, Unidata).  The first
+attribute of a result is a digest of the file, computed with zeros in place of the digest.
 """
 
 from __future__ import annotations
@@ -28,17 +27,18 @@ TYPES = {"b": 1, "c": 2, "h": 3, "i": 4, "l": 4, "f": 5, "d": 6}
 PIECE = 2**20
 """Bytes that are read at a time."""
 LARGEST = 2**32 - 4
-"""Bytes of the largest variable whose size fits into the header; a larger one has 2^32 - 1 there, and readers compute
-its size from its dimensions.
+"""Bytes of the largest variable whose size fits into the header.
+
+For a larger variable the header contains 2^32 - 1, and readers compute the size from the dimensions.
 """
 
 
 class Sheet:
-    """A file with the variables, dimensions and attributes of a template, but for the given lengths."""
+    """A file with variables, dimensions and attributes of a template, and with other lengths of some dimensions."""
 
     def __init__(self, file: BinaryIO, template: xr.Dataset, lengths: Mapping[str, int]) -> None:
         self.file = file
-        # SciPy writes the template; its header, with the lengths changed, is that of this file.
+        # SciPy writes the template; the header of this file is the same, with the lengths changed.
         with netcdf_file(io.BytesIO(_bytes(template)), mmap=False) as source:
             self.sizes = {name: lengths.get(name, size) for name, size in source.dimensions.items()}
             shapes = {name: tuple(self.sizes[d] for d in v.dimensions) for name, v in source.variables.items()}
@@ -49,7 +49,7 @@ class Sheet:
             first = b"CDF\2" + ABSENT + _dimensions(self.sizes) + _attributes(source._attributes)
             fixed = {name: np.array(v.data) for name, v in variables.items() if not set(v.dimensions) & set(lengths)}
         first += VARIABLE + struct.pack(">i", len(heads))
-        # Each head ends with the offset of its variable, which is padded to four bytes.
+        # The entry of a variable in the header ends with its offset; variables are padded to four bytes.
         offset = len(first) + sum(len(head) + 8 for head in heads)
         self.begins = {}
         for name, head in zip(order, heads, strict=True):
@@ -63,7 +63,7 @@ class Sheet:
             self._write(self.begins[name], np.asarray(values, dtype=self.types[name]))
 
     def put(self, name: str, rows: np.ndarray, values: np.ndarray) -> None:
-        """Write rows of a variable, numbered over its leading dimensions together. Shapes: values (rows, …)."""
+        """Write rows of a variable; `rows` index its flattened leading dimensions. Shapes: values (rows, …)."""
         values = np.ascontiguousarray(values, dtype=self.types[name])
         length = values.nbytes // max(len(rows), 1)
         for run in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows) != 1) + 1):
@@ -88,14 +88,14 @@ class Sheet:
 
 
 def unsealed(data: xr.Dataset) -> xr.Dataset:
-    """Return the data with room for a digest before the other attributes."""
+    """Return the data with a placeholder for a digest before the other attributes."""
     copy = data.copy(deep=False)
     copy.attrs = {DIGEST: BLANK, **{name: value for name, value in data.attrs.items() if name != DIGEST}}
     return copy
 
 
 def seal(file: BinaryIO) -> None:
-    """Write the digest of a file of `unsealed` data, open for reading and writing, into its room."""
+    """Write the digest into the placeholder of a file of `unsealed` data, open for reading and writing."""
     offset = _digest_offset(file)
     if offset is None:
         raise ValueError("the file has no room for a digest")
@@ -105,7 +105,7 @@ def seal(file: BinaryIO) -> None:
 
 
 def is_sealed(file: BinaryIO) -> bool | None:
-    """Return whether a file fits its digest, or None if it has none."""
+    """Return True if a file matches its digest, None if the file has no digest."""
     offset = _digest_offset(file)
     if offset is None:
         return None
@@ -114,7 +114,7 @@ def is_sealed(file: BinaryIO) -> bool | None:
 
 
 def _digest_offset(file: BinaryIO) -> int | None:
-    """Return the offset of the digest, which only the names of the dimensions precede."""
+    """Return the offset of the digest; only the names of the dimensions come before it."""
     file.seek(0)
     head = _text(DIGEST) + struct.pack(">ii", TYPES["c"], len(BLANK))
     index = file.read(PIECE).find(head)

@@ -27,25 +27,24 @@ EVERY = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a call is: the cells of a sweep, the periods of an average, the values of a parameter.
+    """Progress of a call that counts units: cells of a sweep, periods of an average, or values of a parameter.
 
     Attributes
     ----------
     total, done, kept : float
-        How many there are, how many have ended, and how many of these an earlier run had finished;
-        whole numbers but for periods. If an average is precise enough, or a branch ends, the total
-        becomes what is done.
+        Number of units, number of units done, and number of those already done in an earlier run.  The numbers are
+        integers, except for periods.  If an average is precise enough early, or a branch ends, `total` becomes `done`.
     statuses : mapping of Status to int
-        How many cells ended how; empty if no cells are counted.
+        Number of cells that ended with each status; empty if the units are not cells.
     compiling : float
-        Seconds that the compilation of a sweep's kernel took, or its loading.
+        Seconds to compile or load the kernel of a sweep.
     running : float
-        Seconds since the first one began.
+        Seconds since the first unit began.
     preparing : float
-        Seconds before that: equations, text of the kernel, exponents of a certified run; the
-        compilation too if it is not in `compiling`.
+        Seconds before the first unit: equations, text of the kernel, exponents of a certified run, and compilation
+        unless counted in `compiling`.
     unit : str
-        What is counted: "cell", "period" or "value".
+        The unit: "cell", "period" or "value".
     """
 
     total: float
@@ -59,26 +58,24 @@ class Progress:
 
     @property
     def share(self) -> float:
-        """Part that is done, from 0 to 1."""
+        """Fraction done, from 0 to 1."""
         return self.done / self.total if self.total > 0 else 1.0
 
     @property
     def rate(self) -> float:
-        """How many a second in this run."""
+        """Units per second in this run."""
         return (self.done - self.kept) / self.running if self.running > 0.0 else 0.0
 
     @property
     def left(self) -> float:
-        """Seconds left at this rate; infinite before the first one has ended, unless none is left."""
+        """Remaining seconds at this rate; infinite before the first unit is done, 0 if no unit remains."""
         if self.done >= self.total:
             return 0.0
         return (self.total - self.done) / self.rate if self.rate > 0.0 else float("inf")
 
     @property
     def failures(self) -> str:
-        """How many cells ended otherwise than at the end of their window, in words; empty if none
-        did.
-        """
+        """Text with the number of cells that did not reach the end of their window, by status; empty without any."""
         bad = ((s, n) for s, n in self.statuses.items() if s != Status.FINISHED and n)
         return ", ".join(f"{n} {s.name.lower().replace('_', ' ')}" for s, n in bad)
 
@@ -101,14 +98,14 @@ def duration(seconds: float) -> str:
 
 
 def _has_bars() -> bool:
-    """Return whether stderr is a terminal, or this process the kernel of a notebook."""
+    """Return True if stderr is a terminal, or if this process is the kernel of a notebook."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     return bool(getattr(sys.stderr, "isatty", bool)()) or "IPKernelApp" in getattr(shell, "config", ())
 
 
 @dataclass(slots=True)
 class Reporter:
-    """Counts what has ended and shows a bar on a terminal or in a notebook, else a line every minute."""
+    """Count units that are done; show a bar on a terminal or in a notebook, else a line every minute."""
 
     total: float
     show: bool | None = None  # False shows nothing, None a bar or lines, True a bar everywhere
@@ -116,7 +113,7 @@ class Reporter:
     unit: str = "cell"
     counts: np.ndarray = field(default_factory=lambda: np.zeros(CODES, dtype=np.int64))  # (CODES,): ended cells
     done: float = 0
-    kept: float = 0  # of these from an earlier run
+    kept: float = 0  # the part of `done` from an earlier run
     preparing: float = 0.0
     compiling: float = 0.0
     began: float = field(default_factory=time.perf_counter)
@@ -129,7 +126,7 @@ class Reporter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *problem: object) -> None:
-        if kind is None and self.done < self.total:  # an average that is precise enough early, or a branch that ends
+        if kind is None and self.done < self.total:  # an average was precise enough early, or a branch ended
             self.total = self.done
             if self._bar is not None:
                 self._bar.total = self.done
@@ -147,7 +144,7 @@ class Reporter:
             self.done = self.kept = int(counts.sum())
         if self.show or (self.show is None and _has_bars()):
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # that a notebook has no widgets, with which bars are prettier
+                warnings.simplefilter("ignore")  # tqdm warns if a notebook has no widgets
                 from tqdm.auto import tqdm
 
             note = f"compiled in {duration(compiling)}" if compiling >= 1.0 else None
@@ -160,7 +157,7 @@ class Reporter:
         self.advance(int(counts.sum()))
 
     def advance(self, amount: float) -> None:
-        """Count what has ended, in units."""
+        """Add an amount of units that are done."""
         self.done += amount
         if self._bar is not None:
             self._bar.set_postfix_str(self.now.failures, refresh=False)
@@ -171,14 +168,14 @@ class Reporter:
         self._call_hook()
 
     def each(self, values: Iterable[T]) -> Iterator[T]:
-        """Yield values and count each of them when the next one is asked for."""
+        """Yield values; count each value as done when the caller requests the next."""
         for value in values:
             yield value
             self.advance(1)
 
     @property
     def now(self) -> Progress:
-        """Present state of the call."""
+        """Return the present progress of the call."""
         statuses = MappingProxyType({s: int(self.counts[s]) for s in Status if self.counts[s]})
         running = time.perf_counter() - self.began
         return Progress(self.total, self.done, self.kept, statuses, self.compiling, running, self.preparing, self.unit)

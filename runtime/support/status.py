@@ -7,13 +7,11 @@ from enum import IntEnum
 import numpy as np
 
 CODES = 16
-"""Room for codes in counts, also in files: more than exist, so that new ones find a place."""
+"""Length of arrays of counts by status code, also in files; longer than needed, so that codes can be added."""
 
 
 class Status(IntEnum):
-    """Status of one cell; `FINISHED` alone is success.  The numbers are those of the generated
-    kernels.
-    """
+    """Status of one cell; only `FINISHED` is success.  Generated kernels use the same numbers."""
 
     NOT_RUN = 0
     FINISHED = 1
@@ -27,7 +25,7 @@ class Status(IntEnum):
 
     @property
     def message(self) -> str:
-        """What happened and what helps."""
+        """Text that describes the event and the remedy."""
         return _MESSAGES[self]
 
 
