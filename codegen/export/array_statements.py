@@ -47,6 +47,7 @@ def jacobian_arrays(model: Equations) -> list[Statement]:
 
 def mass_arrays(model: Equations) -> list[Statement]:
     """Return the statements that build the sparse mass matrix `mass_`: the identity plus the entries of links."""
+    # begin with the identity; `store` appends the entries that each link adds
     every = call("np.arange", "DIMENSION")
     rows: list[Expression] = [every]
     columns: list[Expression] = [every]

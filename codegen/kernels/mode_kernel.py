@@ -130,6 +130,7 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
 
 def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[list[str], int, int]:
     """Return the functions of a step in stages, the length of the shared array, the operations of the orbit's step."""
+    # the orbit: after each stage, store the coefficients of A at the state of the stage
     plain = variation.orbit
     blocks = analyse(plain.node, names, plain.varied)
     parts = Parts.of(variation, method.stages)
@@ -143,6 +144,7 @@ def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[lis
         tuple(writer.statements),
         role=Role.ENTRY,
     )
+    # the modes: the same method for d' = A d, with the stored coefficients
     modes = Function(
         "mode_step",
         ("shared", "strengths", "old", "new", "which"),

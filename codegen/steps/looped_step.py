@@ -77,10 +77,12 @@ class LoopedStep(StepWriter):
 
     def opening(self) -> None:
         """Name the parts of the workspace and load the parameters that all nodes share."""
+        # vectors with one entry for each state lie one after another behind the dense output
         vectors = [*(f"K{j + 1}" for j in range(len(self.method.c))), "STATE", "SLOPE", "TIME_SLOPE", "MATRIX"]
         starts: dict[str, Expression] = {
             name: Name("DENSE_ROWS") * "DIMENSION" + i * Name("DIMENSION") for i, name in enumerate(vectors)
         }
+        # `behind` is the end of the workspace so far: behind the matrix and, if incomplete, its factors
         behind = starts["MATRIX"]
         if self.solves:
             starts["ENTRIES"] = Name("DIMENSION") + "column.size"
@@ -245,10 +247,12 @@ class LoopedStep(StepWriter):
         """Turn the right-hand side of stage i into its rates."""
         m = self.method
         if not m.implicit:
+            # K already holds the right-hand side f; with a mass matrix, solve M k = f
             self.mass.explicit("STATE" if i else "y", f"K{i + 1}")
             return
         if i > 0:
             self.mass.rates_of_stage(i)
+        # right-hand side of the linear equations: f + (1/h) sum C_ij k_j + d_i h f_t for each state
         for row, (rows, place) in enumerate(self.places.rows):
             loop: list[Statement] = []
             terms: list[Expression] = [load_from("SLOPE", place)]

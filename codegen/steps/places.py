@@ -236,6 +236,7 @@ def by_joint(equations: Equations) -> list[tuple[Link, Layer]]:
 def where_table(equations: Equations) -> np.ndarray:
     """Return the array `where` (see the head of this file); empty if all nodes and all links are alike."""
     slots = {name: k for k, name in enumerate(equations.parameters, start=equations.dimension)}
+    # rows of nodes: indices of states, then slots of parameters; -1 if a node lacks one
     of_nodes: list[np.ndarray] = []
     if equations.mixed:
         size = max(len(node.state) for node in equations.nodes)
@@ -245,6 +246,7 @@ def where_table(equations: Equations) -> np.ndarray:
             table[: len(places[i]), number] = places[i]
             table[size:, number] = [slots.get(f"{name}_{i + 1}", -1) for name in equations.varied]
         of_nodes = [table.reshape(-1)]
+    # rows of links: slots of parameters, in the order of a kernel
     links = by_joint(equations) if equations.numbered else []
     of_links = [
         slots[layer.name(name, link)] if name in layer.varied else -1

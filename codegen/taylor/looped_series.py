@@ -469,6 +469,7 @@ class LoopedSeries(TaylorStepWriter):
 
     def summed(self, links: LinkSums, functions: Mapping[sp.Symbol, Series]) -> Iterator[SeriesLoop]:
         """Yield the sections of sums over links: the sums of functions of the sources, contributions to the rates."""
+        # 1. add up, over the links of each target, the functions of the source times the factors of the link
         edge, joint = links.joint.edge, links.joint
         sums = Gathered(
             SeriesGraph(self.names), self.order, span=joint.span, count=self.layout.links, nodes=self.equations.n
@@ -483,6 +484,7 @@ class LoopedSeries(TaylorStepWriter):
         sums.totals = [(symbol.name, s) for symbol, s in zip(links.sums, series, strict=True)]
         yield sums
 
+        # 2. compute the rates of each target from its sums and its own functions
         nodes, rates = self.layout.kinds[0].span, links.applied()
         target = SeriesLoop(SeriesGraph(self.names), self.order, span=nodes, count=self.equations.n, adds=True)
         used = symbols_in(rates)
