@@ -65,6 +65,7 @@ def minimal_polynomial(number: sp.Expr | Root) -> fmpq_poly:
         return monic(number.polynomial)
     if number.is_Rational:
         return fmpq_poly([to_flint(-number), 1])
+    # Try the forms with known polynomials first; a general radical is the slowest case.
     form = cosines.linear_cosine(number)
     if form is not None:
         a, b, _, m = form

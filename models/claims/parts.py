@@ -223,6 +223,7 @@ def _compare(part: PartClaim, true_parts: _Parts) -> tuple[bool, str]:
         return _holds(part, AngleSum.rational(count), one), str(count)
     if part.word == "ratio":
         value, unit = true_parts.largest, true_parts.slowest
+        # Show the ratio of rational eigenvalues as a fraction, of other real ones as a decimal.
         if isinstance(value, AngleSum) and isinstance(unit, AngleSum) and not (value.terms or unit.terms):
             shown = str(value.shift / unit.shift)
         elif _is_complex(value) or _is_complex(unit):

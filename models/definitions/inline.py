@@ -412,7 +412,7 @@ class _ModelNames:
         parameters: Mapping[str, Parameter],
         scaling: Scaling | None = None,
     ) -> _ModelNames:
-        """Make the names of a model; `coordinates` maps coordinates to names of velocities ("" for none)."""
+        """Make the names of a model; `table` maps coordinates to names of velocities ("" for none)."""
         states = (*table, *filter(None, table.values()))
         physical: Mapping[str, str] = {} if scaling is None else scaling.physical
         # Constants that define the scales are positive, so that SymPy splits roots of their products.
@@ -536,6 +536,7 @@ def _coordinates(what: str, value: object, moving: Iterable[AppliedUndef]) -> Ma
     names = [_name(what, "coordinate", key) for key in value]
     if not names:
         raise ValueError(f"{what}: found no coordinates; expected at least one")
+    # Default names of velocities: v for a single coordinate, else v_x, v_y, …
     speeds = ["v"] if len(names) == 1 else [f"v_{name}" for name in names]
     return _distinct(what, "coordinate", dict(zip(names, speeds, strict=True)), len(names))
 

@@ -140,7 +140,7 @@ class ClosedForm:
         return self.build(numbers)
 
     def as_dict(self) -> dict[str, object]:
-        """Return what `synchain spectrum FAMILY --symbolic --json` prints."""
+        """Return the dictionary that `synchain spectrum FAMILY --symbolic --json` prints."""
 
         def ranges(indices: tuple[Index, ...]) -> list[list[str]]:
             return [[str(s), sp.sstr(low), sp.sstr(high)] for s, low, high in indices]
@@ -218,6 +218,7 @@ def closed_form(name: str, **options: object) -> ClosedForm:
         form: ClosedForm = formula(**options)
     except ValueError as error:
         raise ValueError(f"topology {name}: {error}") from None
+    # Name the form with the given options only, as in cayley_abelian(shape=(p, q)).
     shown = ", ".join(
         f"{key}=({', '.join(map(str, value))})" if isinstance(value, tuple) else f"{key}={value}"
         for key, value in form.options.items()

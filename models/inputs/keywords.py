@@ -80,6 +80,7 @@ class _Arguments:
         """Explain why `count` positional arguments and `keywords` do not fit; None if they fit."""
         if not keywords and count in self.enough:
             return None
+        # An unknown keyword.
         strange = next((name for name in keywords if name not in self.names and not self.any_name), None)
         if strange is not None:
             if reason := unsupported(strange):
@@ -93,6 +94,7 @@ class _Arguments:
                 f"unknown keyword {short_repr(strange)} of {self.name}; known: {', '.join(self.names) or 'none'}"
                 f"{suggestion(strange, self.names) or other}"
             )
+        # Too many positional arguments.
         if count > len(self.positional) and not self.any_position:
             shown = [name for name in self.positional if name in self.names]
             by_name = [name for name in self.names if name not in self.positional]
@@ -100,6 +102,7 @@ class _Arguments:
             others = f"; give the others by name: {', '.join(by_name)}" if by_name else ""
             without = count - len(self.positional) + len(shown)
             return f"{self.name}: found {without} argument{'s' * (without > 1)} without a name; expected {most}{others}"
+        # An argument given twice, or a missing argument.
         placed = self.positional[:count]
         twice = next((name for name in placed if name in keywords), None)
         if twice is not None:

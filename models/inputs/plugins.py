@@ -235,6 +235,7 @@ def _module(kind: PluginKind, own: OwnFile, text: bytes | None = None) -> Module
     key = (kind.name, own.path, own.digest)
     if key in _modules:
         return _modules[key]
+    # A scene from another process has only the digest: run the file only if its text is still the same.
     if text is None:
         text = _text(kind, own, Path(own.path))
         if hashlib.sha256(text).hexdigest() != own.digest:

@@ -197,6 +197,7 @@ class ParsedText:
         if not isinstance(node.op, (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Mod, ast.Pow)):
             raise NoMeaning
         a = self._value(node.left, algebra, depth)
+        # Pass a literal integer exponent on as an int: some algebras support no other powers.
         match node.op, node.right:
             case ast.Pow(), ast.Constant(value=int() as exponent) if not isinstance(exponent, bool):
                 return algebra.whole_power(a, exponent)

@@ -180,6 +180,7 @@ class _NetworkText:
         equations, states = self.equations, self.equations.symbols(i)
         row = [e.xreplace(equations.at_node(i)) for e in _masses(equations.node_at(i), c)]
         left = _massive(row, states, writer) if row else writer.write(states[c]) + "'"
+        # Collect the inertia of all links that node i feels: masses times rates of both ends.
         ends: dict[sp.Symbol, None] = {}
         terms: list[sp.Expr] = []
         for link, edge in equations.linked() if equations.inertial else ():

@@ -107,6 +107,7 @@ def _parents_first(n: int, entries: Entries) -> list[tuple[int, int]] | None:
         if i != j:
             near[i].add(j)
             near[j].add(i)
+    # Search each component depth first; a second way to a node is a cycle.
     parents: dict[int, int] = {}
     for start in range(n):
         waiting = [start] if parents.setdefault(start, -1) == -1 else []

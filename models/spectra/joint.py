@@ -147,6 +147,7 @@ def _check(graphs: Sequence[Matrix]) -> None:
     if sizes[0] > DENSE_LIMIT:
         raise ValueError(f"joint spectrum: found {sizes[0]} nodes; expected at most {DENSE_LIMIT} for several graphs")
     itself = fmpq_poly([0, 1])
+    # Matrices scaled to integers commute exactly if the matrices themselves do.
     matrices = [value_at(graph, itself) for graph in graphs]
     for i, first in enumerate(matrices):
         for j in range(i):

@@ -125,7 +125,7 @@ class Spectrum(HasLatex, HasPlot):
         return tuple(e.evaluate(digits) for e in self.eigenvalues)
 
     def as_dict(self) -> dict[str, object]:
-        """Return what `synchain spectrum --json` prints; a complex value is [real, imaginary].
+        """Return the dictionary that `synchain spectrum --json` prints; a complex value is [real, imaginary].
 
         Each polynomial is written once.  A root refers to its polynomial by number, and has the index of CRootOf.
         """

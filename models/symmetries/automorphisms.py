@@ -67,6 +67,7 @@ def _search(graph: Topology, step_limit: int) -> Iterator[Permutation]:
 def _order(graph: Topology, colour: tuple[int, ...]) -> tuple[list[int], dict[int, int]]:
     """Order the nodes breadth first, from rare colours; map each to an earlier neighbour, if it has one."""
     near = _neighbours(graph)
+    # Nodes of rare colours have few possible images: start there to keep the search short.
     rare = sorted(range(graph.n), key=lambda i: (colour.count(colour[i]), i))
     order: list[int] = []
     anchor: dict[int, int] = {}

@@ -37,6 +37,7 @@ def formula(step: object = 2) -> ClosedForm:
     from ..graphs.closed_forms import NODE, ClosedForm, K, P, Term
 
     chosen = integer_option("step", step, 1)
+    # On waves exp(2πik·/p), ring and star polygon form the matrix ((2 ring - 3, 1), (1, 2 inside - 3)).
     ring, inside = cos(2 * pi * K / P), cos(2 * pi * K * chosen / P)
     root, indices = sqrt((ring - inside) ** 2 + 1), ((K, S.Zero, P - 1),)
     wave = exp(2 * pi * I * K * Mod(NODE, P) / P)

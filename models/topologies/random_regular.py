@@ -52,9 +52,11 @@ def _paired(n: int, degree: int, stream: random.Random) -> _Edges | None:
     ends = [i for i in range(n) for _ in range(degree)]
     joined: _Edges = set()
     while ends:
+        # Shuffle by Fisher and Yates with random(), whose values are the same in all versions of Python.
         for k in range(len(ends) - 1, 0, -1):
             j = int(stream.random() * (k + 1))
             ends[k], ends[j] = ends[j], ends[k]
+        # Join neighbours in the list; collect ends that would form a loop or a repeated edge for the next round.
         left: list[int] = []
         for a, b in zip(ends[::2], ends[1::2], strict=True):
             pair = (min(a, b), max(a, b))
