@@ -1,14 +1,13 @@
-"""The figures of the paper and of the exponents behind them, one file for each kind.
+"""The figures of the paper, and figures of the exponents that explain them; one file for each kind of figure.
 
 A figure is a module of this folder with
 
-* NAMES: the figures that it makes, and optionally EXTRA: figures that are made only by name,
+* NAMES: the figures of the module, and optionally EXTRA: figures that are drawn only on request by name,
 * SIZE: width and height in inches,
-* ``compute(name, runs) -> data``: the numbers, by public functions; `FigureRuns` keeps the runs that
-  several figures need,
-* ``texts(data) -> dict``: the text of each file beside the drawing, by the ending of its name:
-  ".csv" with the numbers of the drawing, in some figures "_ranges.csv" and ".md",
-* ``draw(figure, data) -> axes``: draws into an empty matplotlib figure and returns its axes.
+* ``compute(name, runs) -> data``: compute the numbers by public functions; `FigureRuns` shares runs between figures,
+* ``texts(data) -> dict``: return the text of each file beside the drawing, by the ending of its name: ".csv" with the
+  numbers of the drawing, in some figures "_ranges.csv" and ".md",
+* ``draw(figure, data) -> axes``: draw into an empty matplotlib figure and return its axes.
 
 Discovery is a listing of the folder: a new figure is one new file.
 """
@@ -26,7 +25,7 @@ __all__ = ["load", "names"]
 
 
 def names(extra: bool = False) -> tuple[str, ...]:
-    """List the names of the figures, and with `extra` of those that are made only by name."""
+    """List the names of the figures; with `extra` also of figures that are drawn only on request by name."""
     return tuple(sorted(name for name, (_, by_default) in _listing().items() if by_default or extra))
 
 
@@ -40,7 +39,7 @@ def load(name: str) -> ModuleType:
 
 @cache
 def _listing() -> dict[str, tuple[ModuleType, bool]]:
-    """Return the module of each figure, and whether the figure is made by default."""
+    """Return for each figure its module, and False if the figure is drawn only on request by name."""
     listing: dict[str, tuple[ModuleType, bool]] = {}
     for entry in pkgutil.iter_modules(__path__):
         module = import_module(f".{entry.name}", __name__)

@@ -1,8 +1,7 @@
 """Figures 3 and 4d-f: bifurcation diagrams, the position at the section over frequency or coupling.
 
-Every cell starts from the initial state of the scene. Names that end in _up and _down are the same
-diagrams with each cell continued from its neighbour; differences between them show coexisting
-attractors.
+Every cell starts from the initial state of the scene. In figures whose names end in _up and _down each cell continues
+from the final state of its neighbour; differences between the diagrams show coexisting attractors.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ def compute(name: str, runs: FigureRuns) -> Result:
 
 
 def points(result: Result) -> np.ndarray:
-    """Collect axis value and section point of all finished cells. Shapes: returns (k, 2)."""
+    """Return axis value and section point of all finished cells. Shapes: returns (k, 2)."""
     values = result.data[result.scene.axes[0].name].values
     x = result.section.sel(component="x", node=1).values
     good = np.isfinite(x) & (result.status.values == Status.FINISHED)[:, None]
@@ -45,7 +44,7 @@ def points(result: Result) -> np.ndarray:
 
 
 def texts(data: Result) -> dict[str, str]:
-    """Return one row for each section point; a cell without any has one row with its status."""
+    """Return one row for each section point; a cell without section points has one row with its status."""
     axis, states, section = data.scene.axes[0].name, data.scene.equations.state, data.states("section")
     rows: list[tuple[object, ...]] = []
     for k, (value, status) in enumerate(zip(data.data[axis].values, status_names(data.status), strict=True)):

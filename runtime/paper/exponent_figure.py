@@ -25,7 +25,7 @@ from .published import PAIRS, published_ranges
 NAMES = ("msf",)
 SIZE = (COLUMN, 4.4)
 HIGHEST = 1.2
-"""Largest strength: that of the paper's probe, sigma = 0.6 of two oscillators."""
+"""Largest strength alpha: the largest of the paper's two-oscillator probe, alpha = 2 sigma with sigma = 0.6."""
 
 
 def curve(scene: Scene, runs: FigureRuns) -> MSF:
@@ -36,7 +36,7 @@ def curve(scene: Scene, runs: FigureRuns) -> MSF:
 
 
 def effort(runs: FigureRuns) -> dict[str, Any]:
-    """Return options of `exponents` that fit the quality of the runs."""
+    """Return the options of `exponents` for the quality of the runs."""
     quality = runs.quality
     return {
         "precision": 2.0 * quality.resolution,
@@ -48,7 +48,7 @@ def effort(runs: FigureRuns) -> dict[str, Any]:
 
 
 def compute(name: str, runs: FigureRuns) -> tuple[MSF, ...]:
-    """Return the function at each of the paper's frequencies."""
+    """Return the master stability function at each frequency of the paper."""
     return tuple(curve(Scene(topology=topology("chain", 2), parameters={"omega": omega}), runs) for omega in PAIRS)
 
 

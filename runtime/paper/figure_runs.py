@@ -1,4 +1,4 @@
-"""The runs behind the figures: their quality, and a store that shares them between figures."""
+"""The runs for the figures: their quality, and a store that shares runs between figures."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ T = TypeVar("T")
 class Quality:
     """Resolution of the figures."""
 
-    points: int | None = None  # most values of a scene's axis if every value is run once; None for all
-    grid: int | None = None  # number of values on which synchronous ranges are searched; None for all
+    points: int | None = None  # largest number of values of an axis that is run once per value; None for all
+    grid: int | None = None  # number of values of sigma for the search of synchronous ranges; None for all
     criterion: AppliedCriterion = PAPER  # criterion of synchronisation
     resolution: float = 5e-4  # width in sigma to which the ends of synchronous ranges are refined
-    networks: tuple[int, ...] = (5, 6)  # sizes above the paper's for which no synchronisation is expected
+    networks: tuple[int, ...] = (5, 6)  # sizes of longer chains, for which no synchronisation is expected
 
 
 FULL = Quality()
@@ -42,7 +42,7 @@ QUICK = Quality(241, 121, replace(PAPER, starts=5, transient=400.0, window=50.0,
 
 
 class FigureRuns:
-    """Computes what several figures need once, also for figures in different threads."""
+    """Compute once the runs that several figures need, also for figures in different threads."""
 
     def __init__(self, quality: Quality = FULL, *, workers: int | None = None) -> None:
         self.quality = quality
@@ -57,7 +57,7 @@ class FigureRuns:
         self._results: dict[Hashable, Future[Any]] = {}
 
     def stop(self) -> None:
-        """End the runs in other threads: each raises KeyboardInterrupt after its present block."""
+        """Stop the runs in other threads: each raises KeyboardInterrupt after its present block."""
         self._stopped.set()
 
     def _stop_if_asked(self, progress: Progress) -> None:
@@ -65,7 +65,7 @@ class FigureRuns:
             raise KeyboardInterrupt
 
     def once(self, key: Hashable, compute: Callable[[], T]) -> T:
-        """Return the result of the first call with this key; other threads wait for it."""
+        """Return the result of the first call with this key; other threads wait for that result."""
         with self._lock:
             is_first = key not in self._results
             future: Future[T] = self._results.setdefault(key, Future())
@@ -77,7 +77,7 @@ class FigureRuns:
         return future.result()
 
     def run(self, scene: Scene) -> Result:
-        """Run a scene over its axes, with as few values as the chosen quality allows."""
+        """Run a scene over its axes, thinned to the number of values of the quality."""
         scene = thin(scene, self.quality.points).replace(title="")
         return self.once(("run", scene), lambda: run(scene, **self.options))
 
@@ -89,8 +89,8 @@ class FigureRuns:
         return self.once(("pair", pair), lambda: probe(pair, alpha, **self._criterion))
 
     def network(self, scene: Scene) -> Sweep:
-        """Simulate a scene's network on its own grid of sigma to find its synchronous ranges."""
-        if scene.topology == topology("chain", 2):  # the probe itself
+        """Simulate a scene's network on the sigma axis of the scene to find its synchronous ranges."""
+        if scene.topology == topology("chain", 2):  # the network is the probe itself
             pair = self.pair(scene)
             return Sweep(0.5 * pair.x, pair.error, pair.share, tuple(scale(pair.intervals, 0.5)))
         scene = thin(scene, self.quality.grid).replace(title="")
@@ -99,24 +99,24 @@ class FigureRuns:
         return self.once(("network", scene), lambda: simulate(cell, sigma, **self._criterion))
 
     def after(self, scene: Scene, sigma: np.ndarray, transient: float) -> Sweep:
-        """Simulate a scene's network after a transient of another length. Shapes: sigma (k,)."""
+        """Simulate a scene's network at `sigma` with another length of the transient. Shapes: sigma (k,)."""
         criterion = replace(self.quality.criterion, transient=transient)
         options = {**self._criterion, "criterion": criterion, "resolution": math.inf}  # ends are not refined
         return simulate(scene.replace(axes=(), record=("sync_error",)), sigma, **options)
 
     def predicted(self, scene: Scene) -> list[Interval]:
-        """Project the ranges of the probe onto a scene's values of sigma by its exact spectrum."""
+        """Predict the ranges of sigma of a scene from the ranges of the probe, by the exact spectrum of the graph."""
         return project(self.pair(scene).intervals, scene.spectrum, max(scene.axes[0].values))
 
     def chain(self, n: int, omega: float) -> Scene:
-        """Return a chain with couplings up to the largest alpha of the probe, 1.2 = sigma max |gamma|."""
+        """Return a chain with couplings from 0 to the largest alpha of the probe: sigma max |gamma| = 1.2."""
         scene = Scene(topology=topology("chain", n), parameters={"omega": omega})
         largest = max(abs(value) for value in scene.spectrum.values)
         return _with_couplings(scene, round(1.2 / largest, 3), 301)
 
 
 def thin(scene: Scene, points: int | None) -> Scene:
-    """Reduce the axes of a scene to at most `points` values, both ends among them; None keeps all."""
+    """Reduce each axis of a scene to at most `points` values, including both ends; None keeps all values."""
     if points is None:
         return scene
     axes = []
@@ -128,5 +128,5 @@ def thin(scene: Scene, points: int | None) -> Scene:
 
 
 def _with_couplings(scene: Scene, highest: float, count: int) -> Scene:
-    """Return a scene with `count` couplings from 0 to `highest`."""
+    """Return a scene with an axis of `count` couplings sigma from 0 to `highest`."""
     return scene.replace(axes=(Axis.between("sigma", 0.0, highest, count),))

@@ -34,7 +34,7 @@ def compute(name: str, runs: FigureRuns) -> FrictionCurve:
     scene = load_scene(name)
     law = scene.model.kinds[0].friction
     assert law is not None  # the oscillator of this figure slips on a belt
-    # The law with the scene's numbers, and the same with its jump smoothed over 1 / kappa.
+    # The law at the parameters of the scene, and the law with its jump smoothed over the width 1 / kappa.
     kappa = sp.Symbol("kappa", real=True)
     values = {sp.Symbol(key, real=True): scene.parameters[key] for key in (*law.parameters, "kappa")}
     sharp, smooth = (

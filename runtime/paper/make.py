@@ -1,4 +1,4 @@
-"""Writing figures and their tables into a folder."""
+"""Write figures and their tables into a folder."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from . import names as all_names
 from .figure_runs import FULL, QUICK, FigureRuns
 
 AT_ONCE = 2
-"""Figures computed at a time, so that one uses the cores while another compiles or finds a spectrum (a choice)."""
+"""Figures computed at a time: one uses the cores while the other compiles or computes a spectrum (a choice)."""
 
 
 def make(names: Iterable[str] | None, out: str | PathLike[str], **options: Any) -> list[Path]:
-    """Compute and draw figures; return their files. Arguments are those of `written`."""
+    """Compute and draw figures; return their files. `written` documents the arguments."""
     return [*written(names, out, **options)]
 
 
@@ -31,9 +31,9 @@ def written(
     workers: int | None = None,
     show_progress: bool | None = None,
 ) -> Iterator[Path]:
-    """Compute and draw figures, by default all; yield each file as soon as it is complete.
+    """Compute and draw figures, by default all; yield the path of each file as soon as the file is complete.
 
-    A figure gives `<name>.png`, `<name>.svg` and `<name>.csv`, some also `<name>_ranges.csv` or
+    The files of a figure are `<name>.png`, `<name>.svg`, `<name>.csv`, and for some figures `<name>_ranges.csv` or
     `<name>.md`.
     """
     figures = {name: load(name) for name in names or all_names()}

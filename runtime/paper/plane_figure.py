@@ -1,8 +1,7 @@
 """The master stability function over complex strengths, and the modes of a network on it.
 
-A mode with a complex eigenvalue gamma has the strength alpha + i beta = -sigma gamma: with sigma it
-moves along a ray from the origin. The network is stable if all its modes lie inside the zero
-contour.
+A mode with a complex eigenvalue gamma has the strength alpha + i beta = -sigma gamma. With growing sigma the strength
+moves along a ray from the origin. The network is stable if all its modes lie inside the contour of exponent zero.
 """
 
 from __future__ import annotations
@@ -28,9 +27,9 @@ SIZE = (COLUMN, 2.5)
 OMEGA, SIGMA, NODES = 1.40, 0.13, 4
 """Frequency, coupling at which the modes are marked, and size of the network (a choice)."""
 TOP = 0.6
-"""Largest imaginary part."""
+"""Largest imaginary part beta of the grid."""
 FINE = 161
-"""Real parts of the full grid."""
+"""Number of real parts alpha of the full grid."""
 
 
 def uneven_ring(n: int, back: Fraction = Fraction(1, 2)) -> Topology:
@@ -43,7 +42,7 @@ def compute(name: str, runs: FigureRuns) -> Plane:
     """Compute the function at one frequency; the lower half of the plane mirrors the upper."""
     scene = Scene(topology=uneven_ring(NODES), parameters={"omega": OMEGA})
     grid = runs.quality.grid
-    count = FINE if grid is None else min(grid // 2 + 1, FINE)  # the square of a line's effort
+    count = FINE if grid is None else min(grid // 2 + 1, FINE)  # fewer than on a line: the cost grows as count squared
     alpha, beta = np.linspace(0.0, HIGHEST, count), np.linspace(0.0, TOP, count // 2 + 1)
     return plane(scene, alpha, beta, **effort(runs))
 
@@ -61,7 +60,7 @@ def texts(data: Plane) -> dict[str, str]:
 
 
 def draw(figure: Figure, data: Plane) -> Axes:
-    """Draw the plane with the rays of its scene's network."""
+    """Draw the plane with the rays of the network of the scene."""
     axes = figure.add_subplot()
     draw_plane(axes, data)
     return draw_rays(axes, data, SIGMA)

@@ -1,9 +1,9 @@
-"""Figures 5-8: the two-oscillator probe, projected through the eigenvalues of a network.
+"""Figures 5-8: predict the synchronous ranges of a network from the two-oscillator probe and the eigenvalues.
 
-Top left: the probe e_II(alpha), drawn vertically, and the exponent of a mode with an axis of its
-own, whose changes of sign are marked. Top right: the lines alpha = sigma |gamma_k|. Below: the
-error of the network. Grey bands carry the probe's synchronous ranges to the lines. If all lines are
-inside, a darker band leads down from there: the predicted range of sigma.
+Top left: the error e_II(alpha) of the probe, drawn vertically, and on a second axis the exponent of a mode, with dots
+at its changes of sign. Top right: the line alpha = sigma |gamma_k| of each mode. Below: the error of the network. Grey
+bands extend the synchronous ranges of the probe to the lines. A darker band leads down from values of sigma at which
+all lines are inside the grey bands: the predicted range of sigma.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def texts(data: Projection) -> dict[str, str]:
 
 def draw(figure: Figure, data: Projection) -> tuple[Axes, Axes, Axes]:
     """Draw the probe (top left), the lines (top right) and the network (below the lines)."""
-    figure.set_layout_engine("none")  # the panels stand so close that the bands run through
+    figure.set_layout_engine("none")  # place the panels by hand, so close that the bands continue across them
     left, middle, right = (0.12, 0.345), 0.375, 0.885
     rays = figure.add_axes((middle, 0.40, right - middle, 0.51))
     probe = figure.add_axes((left[0], 0.40, left[1] - left[0], 0.51), sharey=rays)

@@ -1,8 +1,7 @@
 """The skeleton of the bifurcation diagram of figure 3: periodic orbits and their bifurcations.
 
-Motion and orbits are those of set-valued friction, over a range of frequencies that starts below
-that of the paper, where the motion is periodic. Each orbit is drawn at its crossings of the section
-of figure 3.
+Motion and orbits are computed with set-valued friction. The range of frequencies starts below the range of the paper,
+where the motion is periodic. Each orbit is drawn at its crossings of the section of figure 3.
 """
 
 from __future__ import annotations
@@ -36,16 +35,16 @@ from .figure_runs import FigureRuns
 EXTRA = ("skeleton",)
 SIZE = (COLUMN, 3.3)
 LOW, HIGH = 1.0, 1.9
-"""Frequencies of the diagram."""
+"""Lowest and highest frequency of the diagram."""
 PERIODS = (1, 2, 4)
 COLOURS = {1: PURPLE, 2: ORANGE, 4: BLUE}
 CLOUD = "#b4b4b4"
 CROWDED, INSET = ((1.443, 1.484), (0.585, 0.611)), (0.11, 0.08, 0.36, 0.35)
-"""Magnified part of the diagram, and the position of its inset."""
+"""Magnified part of the diagram (ranges of frequency and position), and the rectangle of its inset in the axes."""
 SAME = 1e-9
-"""Largest distance of two bifurcations of one kind that are one, seen from both branches."""
+"""Bifurcations of one kind that two branches find within this distance of omega are one bifurcation."""
 FULL = (901, 121, 16)
-"""Number of values of omega for the motion, for following orbits and for their search."""
+"""Number of values of omega for the motion, for the continuation of orbits, and for the search of orbits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +54,7 @@ class BranchPoint:
     value: float  # value of the parameter
     orbit: PeriodicOrbit
     x: np.ndarray  # (k,): positions at the section
-    phases: str = ""  # phases of stick and slip in words
+    phases: str = ""  # sequence of stick and slip as text
     kind: BifurcationKind | None = None  # kind of a bifurcation at this orbit
     residual: float = 0.0  # residual of the bifurcation
 
@@ -94,8 +93,8 @@ def _branch_points(scene: Scene, branch: Branch) -> tuple[BranchPoint, ...]:
     ]
     turns = [BranchPoint(t.value, t.orbit, np.empty(0), "", t.kind, t.residual) for t in branch.bifurcations]
     branch_points = sorted([*orbits, *turns], key=lambda point: point.value)
-    # Run two of the longest cycles and keep the first half of the crossings: a crossing at the start
-    # is then counted once.
+    # Run two of the longest cycles and keep the first half of the crossings, so that a crossing at the start of the
+    # run counts once.
     states = np.array([point.orbit.state for point in branch_points])
     starts = {
         branch.name: [point.orbit.scene.parameters[branch.name] for point in branch_points],
@@ -116,7 +115,7 @@ def _branch_points(scene: Scene, branch: Branch) -> tuple[BranchPoint, ...]:
 
 
 def _periods(branch: tuple[BranchPoint, ...]) -> int:
-    """Return the drive periods of a branch's orbits; the orbit that a branch is born from has fewer."""
+    """Return the number of drive periods of the orbits of a branch; an orbit from which it bifurcates has fewer."""
     return max(point.orbit.periods for point in branch)
 
 
@@ -162,7 +161,7 @@ def draw(figure: Figure, data: SkeletonFigure) -> Axes:
         inset.tick_params(labelsize=5.5, pad=2)
         inset.locator_params(nbins=3)
         axes.indicate_inset_zoom(inset, edgecolor=BLACK, linewidth=0.5)
-    # legend of the colours, lines and marks that occur
+    # legend entries only of colours, lines and marks in the drawing
     periods = sorted({_periods(branch) for branch in data.branches})
     kinds = {point.kind for branch in data.branches for point in branch}
     handles = [
@@ -205,17 +204,17 @@ def _draw_diagram(axes: Axes, data: SkeletonFigure, size: float) -> None:
 
 
 def curves(branch: tuple[BranchPoint, ...]) -> list[tuple[bool, list[tuple[float, float]]]]:
-    """Cut a branch into curves at the section if its stability or the number of crossings changes.
+    """Cut a branch into curves of crossings, at each change of stability or of the number of crossings.
 
-    Each curve is its stability and its points (parameter, position).
+    Each curve is a pair: True if stable, and its points (parameter, position).
     """
     lines: list[tuple[bool, list[tuple[float, float]]]] = []
-    crossings, last_stable = branch[0].x, None  # crossings in the order of the lines that are being drawn
+    crossings, last_stable = branch[0].x, None  # crossings of the last orbit, in the order of the curves
     for before, after in pairwise(branch):
         if len(crossings) != len(after.x):
             crossings, last_stable = after.x, None
             continue
-        # Crossings come in the order of time from a phase of the drive: match them by rotation.
+        # Crossings are in the order of time, from an arbitrary one: rotate them to match those of the orbit before.
         shifted = (np.roll(after.x, k) for k in range(len(crossings)))
         ends = min(shifted, key=lambda x: float(np.abs(x - crossings).max()))
         stable = _stable(before, after)
@@ -228,7 +227,7 @@ def curves(branch: tuple[BranchPoint, ...]) -> list[tuple[bool, list[tuple[float
 
 
 def _stable(before: BranchPoint, after: BranchPoint) -> bool:
-    """Return whether the orbits between two points are stable, judged by one that is at no bifurcation."""
+    """Return True if the orbits between two points are stable; test a point that is no bifurcation."""
     for point in (before, after):
         if point.kind is None:
             return point.orbit.stable

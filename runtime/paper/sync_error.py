@@ -22,14 +22,14 @@ SIZE = (COLUMN, 2.2)
 
 
 def compute(name: str, runs: FigureRuns) -> Result:
-    """Run the scene of a figure, with its section so that figures 4d-f share the runs."""
+    """Run the scene of a figure; also record the section, so that figures 4d-f share the runs."""
     return runs.run(load_scene(name).replace(record=("sync_error", "section")))
 
 
 def synchronous(result: Result, tolerance: float = PAPER.tolerance) -> list[Interval]:
     """Find the ranges of the first axis with an average error below a tolerance.
 
-    A range ends half a step beyond its last value.
+    A range extends half a step of the axis beyond its first and its last value.
     """
     x = result.data[result.scene.axes[0].name].values
     good = (result.status.values == Status.FINISHED) & (result.sync_error.values < tolerance)

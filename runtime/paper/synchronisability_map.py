@@ -1,9 +1,8 @@
-"""Drive frequencies and couplings at which networks synchronise: largest exponent of their modes.
+"""Drive frequencies and couplings at which networks synchronise, by the largest exponent of their modes.
 
-The function of one oscillator on a line of strengths serves all networks: the mode of the
-eigenvalue gamma has the exponent Lambda(sigma |gamma|). If the starts lead to different motions, a
-network counts as stable if it is stable for most of them, as in
-`synchain.runtime.synchronisation.threshold`.
+The master stability function Lambda(alpha) of one oscillator is computed once for all networks: the mode of the
+eigenvalue gamma has the exponent Lambda(sigma |gamma|). If initial states lead to different motions, a network counts
+as stable if it is stable for most initial states, as in `synchain.runtime.synchronisation.threshold`.
 
 Source: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998).
 """
@@ -32,17 +31,17 @@ NAMES = ("synchronisability_map",)
 SIZE = (COLUMN, 4.7)
 NETWORKS = (("chain", 2), ("chain", 3), ("chain", 4), ("ring", 6), ("star", 5), ("complete", 5))
 LOW, HIGH, SIGMA = 1.0, 1.8, 0.6
-"""Frequencies, and the largest coupling."""
+"""Lowest and highest frequency, and the largest coupling sigma."""
 
 
 class Map(NamedTuple):
-    """The function of one oscillator at several frequencies."""
+    """The master stability function of one oscillator at several frequencies."""
 
     omega: np.ndarray  # (omegas,): frequencies
     alpha: np.ndarray  # (strengths,): strengths
     sigma: np.ndarray  # (sigmas,): couplings of the panels
     exponent: np.ndarray  # (omegas, starts, strengths): exponents per unit of time
-    attractors: tuple[str, ...]  # kinds of motion of the starts at each frequency
+    attractors: tuple[str, ...]  # for each frequency the kinds of motion that the initial states reach
 
 
 def compute(name: str, runs: FigureRuns) -> Map:
@@ -70,7 +69,7 @@ def _graphs() -> list[Topology]:
 
 
 def largest_exponent(data: Map, graph: Topology) -> np.ndarray:
-    """Return the largest exponent of a network's modes, the median over the starts.
+    """Return the largest exponent of the modes of a network, as the median over the initial states.
 
     Shapes: returns (omegas, sigmas).
     """

@@ -1,6 +1,4 @@
-"""The table of synchronous ranges: measured by simulation, predicted from the probe, where exponents
-are negative, published.
-"""
+"""The table of synchronous ranges: simulated, predicted from the probe, of negative exponents, and published."""
 
 from __future__ import annotations
 
@@ -31,7 +29,7 @@ KINDS = {"measured": (BLUE, 0.3), "predicted": (GREEN, 0.1), "exponents": (PURPL
 """Kinds of ranges, with the colour and the height of their bars."""
 COMPUTED = ("measured", "predicted", "exponents")
 GAP = 0.001
-"""Largest gap in sigma that is bridged, since the ends of chaotic ranges are ragged."""
+"""Largest gap in sigma between two ranges that count as one, since ends of chaotic ranges are ragged (a choice)."""
 
 Ends = tuple[float | None, float | None]
 """Ends of a range; None where there is no range, or no published number."""
@@ -47,8 +45,8 @@ class ThresholdRow:
     predicted: tuple[Interval, ...]
     windows: ExponentWindows  # ranges of sigma with negative exponents
     row: Published | None  # row of the paper
-    failed: int  # number of values of sigma without an error measure, and of all
-    cells: int
+    failed: int  # number of values of sigma without a measured error
+    cells: int  # number of all values of sigma
 
     def ranges(self, kind: str) -> tuple[Interval, ...]:
         """Return the ranges of one of KINDS."""
@@ -60,15 +58,15 @@ class ThresholdRow:
         }[kind]
 
     def ends(self, kind: str) -> Ends:
-        """Return the ends of the range that is compared: the nearest to the published one."""
+        """Return the ends of the range with the largest overlap with the published one."""
         intervals, printed = self.ranges(kind), self.ranges("published")
         if kind == "published":
             return intervals[0] if intervals else (None, None)
-        # Exponents are smooth in sigma: their gaps are no raggedness.
+        # Keep gaps between ranges of negative exponents, which are smooth functions of sigma.
         return nearest(intervals if kind == "exponents" else joined(intervals), printed) or (None, None)
 
     def differences(self, kind: str) -> Ends:
-        """Return the distances of the ends of a kind from the published ones."""
+        """Return the differences between the ends of a kind and the published ends."""
         low, high = (
             None if end is None or printed is None else end - printed
             for end, printed in zip(self.ends(kind), self.ends("published"), strict=True)
@@ -112,7 +110,7 @@ class Comparison:
 
 
 def compute(name: str, runs: FigureRuns) -> Comparison:
-    """Measure the published rows, and longer chains at frequencies without periodic motion."""
+    """Compute the published rows, and rows of longer chains at frequencies without periodic motion."""
     cases = [(row.n, row.omega) for row in PUBLISHED]
     cases += [(n, omega) for n in runs.quality.networks for omega in NOT_PERIODIC]
     rows = []
@@ -126,12 +124,12 @@ def compute(name: str, runs: FigureRuns) -> Comparison:
 
 
 def windows_of(scene: Scene, runs: FigureRuns) -> ExponentWindows:
-    """Return the windows of a network from the exponents of its oscillator, which networks share."""
+    """Return the windows of a network from the exponents of its oscillator, computed once for all networks."""
     return ExponentWindows.of(replace(curve(scene, runs), scene=scene))
 
 
 def scene_of(n: int, omega: float, runs: FigureRuns) -> Scene:
-    """Return the scene of the figure that shows this chain to share its runs, or a new one."""
+    """Return the scene of the figure with this chain, whose runs are shared, else a new scene."""
     for scene in map(load_scene, projection.NAMES):
         if (scene.n, scene.parameters["omega"]) == (n, omega):
             return scene

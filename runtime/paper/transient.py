@@ -1,7 +1,6 @@
-"""Measured synchronous ranges over the length of the transient, beside the published ends.
+"""Simulated synchronous ranges as a function of the length of the transient, with the published ends.
 
-Near an end the error decays over thousands of periods, so that a longer transient finds a wider
-range.
+Near an end of a range the error decays over thousands of periods, so a longer transient finds a wider range.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from .threshold_table import scene_of
 EXTRA = ("transient",)
 SIZE = (COLUMN, 3.6)
 LENGTHS = (0.1, 0.3, 1.0, 3.0)
-"""Transients in units of that of the quality."""
+"""Lengths of transients, in units of the transient of the quality."""
 
 
 class Trial(NamedTuple):
@@ -35,7 +34,7 @@ class Trial(NamedTuple):
 
 
 def compute(name: str, runs: FigureRuns) -> tuple[Trial, ...]:
-    """Sweep sigma around the published ends of the rows without periodic motion."""
+    """Sweep sigma around the published ends, at frequencies without periodic motion."""
     transients = tuple(factor * runs.quality.criterion.transient for factor in LENGTHS)
     step = 0.001 if runs.quality.grid is None else 0.004
     offsets = step * np.arange(-round(0.02 / step), round(0.02 / step) + 1)

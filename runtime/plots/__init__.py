@@ -1,1 +1,1 @@
-"""Plots of all results and of graphs, and the tables of numbers beside them; runs no scene but for an orbit."""
+"""Plots of all results and of graphs, and tables of numbers. Only the plot of an orbit runs a scene."""

@@ -1,4 +1,4 @@
-"""Animations of a run: masses on a moving belt, or oscillators on their graph, beside the phase portrait."""
+"""Animations of a run: masses on a moving belt, or oscillators on a graph, next to the phase portrait."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from .style import BLACK, BLUE, GREY, ORANGE
 LARGEST = 200
 """Largest number of oscillators on a graph that an animation shows."""
 ROW = 12
-"""Largest number of masses that are drawn in a row on a belt; more are nodes of a graph."""
+"""Largest number of masses in a row on a belt; more oscillators are drawn as nodes of a graph."""
 TRAIL = 0.12
-"""Part of the shown time whose path follows each point of the phase portrait."""
+"""Length of the trail of each point of the phase portrait, as a fraction of the shown time."""
 REACH = 0.3
-"""Largest displacement of a drawn mass, as a part of the distance between two masses."""
+"""Largest displacement of a drawn mass, as a fraction of the distance between two masses."""
 STICK = 1e-3
-"""A mass sticks if its sliding speed is at most this part of the largest one."""
+"""A mass sticks if its sliding speed is at most this fraction of the largest sliding speed."""
 
 Update = Callable[[int], None]
 
@@ -40,7 +40,7 @@ class Animation(FuncAnimation):
     figure: Figure
 
     def _repr_html_(self) -> str:
-        plt.close(self.figure)  # else the notebook shows the first frame besides
+        plt.close(self.figure)  # otherwise the notebook also shows the first frame
         return str(self.to_jshtml(default_mode="loop"))
 
 
@@ -58,7 +58,7 @@ def animate(result: Result, seconds: float, fps: int) -> Animation:
     data = result.data.isel({name: 0 for name in result.data.status.dims})
     first, second = (node_states(data.trajectory, result, k) for k in (0, 1))
     path, speed, samples = first.values.T, second.values.T, data.time.values  # (n, samples), samples of time
-    # states (n, frames) at equal distances of time
+    # states (n, frames) at equal time intervals
     time = np.linspace(samples[0], samples[-1], max(2, round(seconds * fps)))
     x, v = (np.array([np.interp(time, samples, row) for row in rows]) for rows in (path, speed))
 
@@ -88,7 +88,7 @@ def animate(result: Result, seconds: float, fps: int) -> Animation:
 
 
 def _belt_speeds(scene: Scene, cell: dict[str, float]) -> np.ndarray | None:
-    """Return the velocity of the ground of each oscillator (n,); None if they do not all rub against one."""
+    """Return the velocity of the ground of each oscillator (n,); None unless all have friction with a ground."""
     if not all(kind.oscillator.takes_friction for kind in scene.model.kinds):
         return None
     try:
@@ -102,7 +102,7 @@ def _belt_speeds(scene: Scene, cell: dict[str, float]) -> np.ndarray | None:
 
 
 def _portrait(axes: Axes, x: np.ndarray, v: np.ndarray, ends: np.ndarray, trail: int, colours: np.ndarray) -> Update:
-    """Draw paths (n, samples) in grey; points with colours (frames, n), and `trail` samples before them, move."""
+    """Draw paths (n, samples) in grey, and moving points with colours (frames, n) and a trail of `trail` samples."""
     axes.plot(x.T, v.T, color=GREY, linewidth=0.6, zorder=1)
     trails = [axes.plot([], [], color=colour, linewidth=1.2)[0] for colour in colours[0]]
     points = axes.scatter(x[:, 0], v[:, 0], c=colours[0], s=28.0, zorder=3)
@@ -171,7 +171,7 @@ def _belt(axes: Axes, scene: Scene, time: np.ndarray, x: np.ndarray, ground: np.
 
 
 def _spring(a: float, b: float, side: float, apart: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return a zigzag between two neighbours, or an arc over the masses between two others."""
+    """Return a zigzag between two neighbours, or an arc over the masses between two distant masses."""
     if apart == 1:
         s = np.linspace(0.0, 1.0, 26)
         wave = np.where((s > 0.15) & (s < 0.85), np.where(np.arange(26) % 2, 0.07, -0.07), 0.0)

@@ -11,11 +11,11 @@ from matplotlib.collections import PathCollection
 from matplotlib.lines import Line2D
 
 SIZE = (4.8, 3.4)
-"""Width and height in inches of figures that belong to no window."""
+"""Width and height in inches of figures without a window."""
 
 
 def axes_of(ax: Axes | None) -> Axes:
-    """Return the given axes, or pyplot's current ones: those of a new figure if there are none, as in xarray."""
+    """Return the given axes, else pyplot's current axes (of a new figure if there are none), as xarray does."""
     if ax is None:
         import matplotlib.pyplot as plt
 
@@ -27,7 +27,7 @@ def axes_of(ax: Axes | None) -> Axes:
 
 
 KEYWORDS = {"s", "c", "cmap", "norm", "vmin", "vmax", "shading"}
-"""Keywords of `scatter` and `pcolormesh` beside the properties of what they draw."""
+"""Keywords of `scatter` and `pcolormesh` that are no properties of a Matplotlib artist."""
 
 
 def check_style(style: Mapping[str, Any], method: str, known: str) -> None:
@@ -40,5 +40,5 @@ def check_style(style: Mapping[str, Any], method: str, known: str) -> None:
 
 
 def line_style(style: Mapping[str, Any], **defaults: Any) -> dict[str, Any]:
-    """Return the style of a line: that of the user, who may write `lw` for `linewidth`, before the defaults."""
+    """Return the style of a line: defaults, replaced by the style of the user, who may write `lw` for `linewidth`."""
     return {**defaults, **normalize_kwargs(dict(style), Line2D)}

@@ -1,4 +1,4 @@
-"""Plots of every kind of result: functions that draw into axes and return them."""
+"""Plots of every kind of result: functions that draw into axes and return the axes."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ DOTS: dict[str, Any] = {"linestyle": "none", "marker": "."}
 
 
 def drawn(value: HasPlot, ax: Axes | None, **style: Any) -> Axes:
-    """Draw a value into axes, by default pyplot's current ones, and return them; `style` goes to Matplotlib's artists."""
+    """Draw a value into axes (default: pyplot's) and return the axes; pass `style` to Matplotlib's artists."""
     keywords = [name for name in inspect.signature(type(value).plot).parameters if name not in ("self", "style")]
     check_style({name: x for name, x in style.items() if name not in keywords}, "plot", ", ".join(keywords))
-    if isinstance(value, Result | Streamed):  # refuses kinds before it opens a figure
+    if isinstance(value, Result | Streamed):  # `draw_result` checks the kind of plot before a figure is opened
         return draw_result(value if isinstance(value, Result) else value.result, ax, **style)
     return _draw(value, axes_of(ax), **style)
 
@@ -69,7 +69,7 @@ def _(value: Plane, axes: Axes, **style: Any) -> Axes:
 
 @_draw.register
 def _(value: Exponents, axes: Axes, **style: Any) -> Axes:
-    """Draw exponents over a strength as a line, over two strengths of a mode as dots, else in order."""
+    """Draw exponents over one strength as a line, over two strengths of a mode as dots, else by index."""
     label, strengths = r"exponent $\Lambda$ per unit of $\tau$", value.alpha.reshape(len(value.alpha), -1)
     columns = np.concatenate([strengths.real, strengths.imag], axis=1).T if np.iscomplexobj(strengths) else strengths.T
     # two strengths, or real and imaginary part of one: coloured dots in their plane, white at zero
@@ -111,7 +111,7 @@ def _(value: Thresholds, axes: Axes, **style: Any) -> Axes:
 
 @_draw.register
 def _(value: Basin, axes: Axes, **style: Any) -> Axes:
-    """Draw the first two initial components of the first node, coloured by the fate of the start."""
+    """Draw initial states by the first two components of the first node, coloured by their `Fate`."""
     initial, names = value.data.initial.values[:, :2, 0], [str(name) for name in value.data.component.values[:2]]
     across, up = (initial[:, 0], initial[:, -1])
     colours = (BLUE, GREEN, ORANGE, PURPLE, BLACK, GREY)
@@ -126,7 +126,7 @@ def _(value: Basin, axes: Axes, **style: Any) -> Axes:
 
 @_draw.register
 def _(value: Spectrum, axes: Axes, **style: Any) -> Axes:
-    """Draw multiplicities over real eigenvalues, complex ones as points of their plane."""
+    """Draw multiplicities over real eigenvalues, and complex eigenvalues as points of the complex plane."""
     values, counts = np.array(list(value.values)), np.array(list(value.multiplicities))
     if np.iscomplexobj(values):
         dots = {"s": 24.0 * counts, "color": BLUE, "alpha": 0.7, **style}

@@ -14,11 +14,11 @@ from .canvas import line_style
 from .style import BLUE, ORANGE, bands
 
 MARKED = 60
-"""Most strengths that are marked; more would cover the line."""
+"""Most strengths that are marked with dots; more dots would hide the line."""
 
 
 def draw_exponent(axes: Axes, function: MSF, sigma: float | None = None, **style: Any) -> Axes:
-    """Draw exponents over all strengths at which they were computed; dots mark the requested ones if they are few.
+    """Draw exponents over all computed strengths; dots mark the requested strengths if these are few.
 
     A band shows two standard errors on either side, grey bands the ranges with a negative exponent. Orange dots
     are the modes of the network at the strength `sigma` of links, by default that of the scene.

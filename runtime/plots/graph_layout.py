@@ -1,10 +1,9 @@
 """Positions of the nodes of a drawn graph: by its family, or by eigenvectors of its Laplacian.
 
 The eigenvectors of the two smallest eigenvalues above 0 place linked nodes near each other (Hall,
-Management Sci. 17, 219 (1970); Koren, Comput. Math. Appl. 49, 1867 (2005)).  Positions coincide or
-depend on rounding if eigenvalues are equal.  Graphs of at most DENSE nodes are therefore improved by
-majorisation of the stress, which fits distances to lengths of shortest paths
-(Gansner, Koren & North, Lecture Notes in Computer Science 3383, 239 (2005)).
+Management Sci. 17, 219 (1970); Koren, Comput. Math. Appl. 49, 1867 (2005)).  If eigenvalues are equal, positions
+coincide or depend on rounding.  For graphs of at most DENSE nodes, majorisation of the stress therefore fits the
+distances to the lengths of shortest paths (Gansner, Koren & North, Lecture Notes in Computer Science 3383, 239 (2005)).
 """
 
 from __future__ import annotations
@@ -96,11 +95,11 @@ _FAMILIES: dict[str, Callable[[Topology], np.ndarray]] = {
     "tree": _levels,
     "complete_bipartite": _sides,
 }
-"""Layouts of families; other graphs are drawn by eigenvectors."""
+"""Layout functions of families; other graphs are drawn by eigenvectors."""
 
 
 def _spectral(graph: Topology) -> np.ndarray:
-    """Put the connected parts side by side, each by its eigenvectors; a graph of nearly no links on a circle."""
+    """Put connected components side by side, each drawn by eigenvectors; put a graph of few links on a circle."""
     part = np.array(join(graph.n, ((target, source) for target, source, _ in graph.links)))
     parts = np.unique(part)
     if len(parts) > graph.n // 2:
@@ -109,7 +108,7 @@ def _spectral(graph: Topology) -> np.ndarray:
     left = 0.0
     for label in parts:
         members = np.flatnonzero(part == label)
-        # the area of a part grows with the number of its nodes
+        # the area of a component is proportional to its number of nodes
         layout = _fit(_eigenvectors(graph, members)) * np.sqrt(len(members))
         points[members] = layout + np.array([left - layout[:, 0].min(), 0.0])
         left += float(np.ptp(layout[:, 0])) + 0.6 * np.sqrt(len(members)) + 0.4
@@ -133,7 +132,7 @@ def _eigenvectors(graph: Topology, members: np.ndarray) -> np.ndarray:
         return _majorise(start, csgraph.shortest_path(adjacency, directed=False, unweighted=True))
     from scipy.sparse.linalg import eigsh
 
-    # the Laplacian is singular, so the shift lies just below 0; a fixed start gives the same drawing every time
+    # the Laplacian is singular, so shift to just below 0; a fixed start vector makes drawings reproducible
     start = np.random.default_rng(0).normal(size=len(members))
     shift = -1e-3 * float(weights.mean())
     values, vectors = eigsh(laplacian.tocsc(), k=3, sigma=shift, v0=start)

@@ -1,4 +1,4 @@
-"""Graphs as drawings: in matplotlib axes, and as SVG text that follows the colours of its page."""
+"""Draw graphs: in matplotlib axes, and as SVG text in the text colour of the page."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ NEGATIVE = "#D55E00"
 """Colour of links with a negative weight."""
 
 SVG_NODES, SVG_LINES = 300, 3000
-"""Most nodes and lines of an SVG; of a larger graph it gives the numbers of nodes and links."""
+"""Most nodes and lines of an SVG; a larger graph is described by its numbers of nodes and links."""
 
 NUMBERED = 0.05
-"""Least radius of nodes that carry their labels."""
+"""Least radius of nodes that are drawn with labels."""
 
 LETTERS = 4
 """Most letters of a label in a node."""
@@ -47,7 +47,7 @@ BEND = 0.18
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
-    """A link, or a link with its mirror image, as it is drawn."""
+    """The line of a link, or of two opposite links of equal weight."""
 
     source: int  # nodes, counted from 0
     target: int
@@ -95,7 +95,7 @@ class Picture:
 
 
 def graph_of(value: HasDrawing) -> Topology:
-    """Return a graph itself, or that of a scene; TypeError for anything else."""
+    """Return a graph unchanged, or the graph of a scene; TypeError for any other value."""
     return value.topology if isinstance(value, Scene) else check_instance("graph", value, Topology, "a graph")
 
 
@@ -129,7 +129,7 @@ def _hits_node(positions: np.ndarray, i: int, j: int) -> bool:
 
 
 def draw_graph(value: HasDrawing, ax: Axes | None = None, values: ArrayLike | None = None, **style: Any) -> Axes:
-    """Draw a graph, or that of a scene, into axes (default: pyplot's); return them.
+    """Draw a graph, or the graph of a scene, into axes (default: pyplot's); return the axes.
 
     `values` (n,) colour the nodes: whole numbers as classes, others by a colour map.
     """
@@ -211,7 +211,7 @@ def _nodes(axes: Axes, picture: Picture, values: ArrayLike | None, style: dict[s
 def svg(value: HasDrawing, width: int = 300) -> str:
     """Return a graph as SVG text, or a sentence for more than SVG_NODES nodes or SVG_LINES lines.
 
-    Lines have the colour of the text around, so that the drawing reads on any ground.
+    Lines have the colour of the surrounding text, so that the drawing is readable on any background.
     """
     graph = graph_of(value)
     if graph.n > SVG_NODES or graph.link_count > 2 * SVG_LINES:

@@ -14,7 +14,7 @@ from .exponent import finite
 from .style import BLACK, symbol
 
 FAR = 100.0
-"""Coupling at the end of a ray, beyond every plane of interest; the limits of the axes cut the ray."""
+"""Coupling sigma at the end of a ray, far outside of the drawn plane; the limits of the axes cut the ray."""
 AXES = {"alpha": r"$\alpha=-\sigma\,\mathrm{Re}\,\gamma$", "beta": r"$\beta=-\sigma\,\mathrm{Im}\,\gamma$"}
 """Labels of axes that are strengths of a mode."""
 RAY: dict[str, Any] = {"color": BLACK, "linestyle": "--", "linewidth": 0.8}
@@ -50,7 +50,7 @@ def draw_plane(axes: Axes, plane: Plane, **style: Any) -> Axes:
 
 
 def _colours(value: np.ndarray) -> tuple[str, TwoSlopeNorm]:
-    """Return a colour map that is white at zero, and its scale; half of the map if all values have one sign."""
+    """Return a colour map that is white at zero, and its norm; only half of the map if all values have one sign."""
     valid = value[np.isfinite(value)]
     low, high = (float(valid.min()), float(valid.max())) if valid.size else (0.0, 0.0)
     if low * high > 0 and not np.isclose(low, high):
@@ -62,7 +62,7 @@ def _colours(value: np.ndarray) -> tuple[str, TwoSlopeNorm]:
 def draw_rays(axes: Axes, plane: Plane, sigma: float | None = None) -> Axes:
     """Draw the ray of every mode of the scene's network.
 
-    Of conjugate modes only the one with beta >= 0 is seen if the plane ends at beta = 0.
+    If the plane ends at beta = 0, only the mode with beta >= 0 of a conjugate pair is visible.
     """
     graph = plane.scene.topology
     still: dict[str, Any] = {"scalex": False, "scaley": False}

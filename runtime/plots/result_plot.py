@@ -27,11 +27,11 @@ CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
 REALISATION = "realisation"
 """Name of the axis of random realisations."""
 FINEST = 1000
-"""Largest number of drawn values per axis of a map; longer axes are thinned."""
+"""Most drawn values on each axis of a map; longer axes are thinned."""
 ROUNDING = 1e-9
 """Draw synchronisation errors below this value as zero."""
 DECADES = 1e3
-"""Draw errors whose largest is this many times the smallest on a logarithmic scale."""
+"""Ratio of the largest to the smallest error from which the scale is logarithmic."""
 MARKED = 60
 """Largest number of cells drawn with a dot each: more dots would hide the line."""
 SHARP = 0.5
@@ -43,11 +43,10 @@ PAINT: dict[str, Any] = {"shading": "nearest", "cmap": "cividis", "rasterized": 
 def draw_result(
     result: Result, ax: Axes | None = None, kind: str | None = None, windows: Iterable[Window] = (), **style: Any
 ) -> Axes:
-    """Draw a result, windows of the coupling strength shaded behind it; `style` goes to Matplotlib's artists.
+    """Draw a result, with shaded windows of the coupling strength behind it; pass `style` to Matplotlib's artists.
 
-    Axes in excess of those of the plot are kept at their first value, the leading ones first: plots
-    over time and of the network show the first cell. Cells that did not finish are omitted and
-    counted above the axes.
+    If the result has more axes than the plot, the leading axes are fixed at their first values; plots over time and of
+    the network show the first cell. Cells that did not finish are omitted, and a note above the plot counts them.
     """
     if kind is not None and kind not in (choices := (*KINDS, *result.scene.observe)):
         raise ValueError(f"unknown kind of plot {kind!r}; known: {', '.join(choices)}{suggestion(kind, choices)}")
@@ -77,17 +76,17 @@ def draw_result(
 
 
 def _possible(result: Result) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the possible plots, the default first, and those of them that draw no observable."""
+    """Return the possible kinds of plot, the default first; and the same without observables."""
     count, data = result.data.status.ndim, result.data
     kinds = []
     if count >= 2:
         kinds.append("map")
     if "sync_error" in data and count >= 1:
         kinds.append("error")
-    # of one run its motion, over parameters its section first
+    # default: the motion for a single run, the section for a sweep
     section = ["section"] if "section" in data else []
     motion = ["time", "phase", "space"] if "trajectory" in data else []
-    if motion:  # the default: curves that can be told apart, else colours
+    if motion:  # default: curves if each oscillator has a different colour, else a space-time map
         motion.sort(key=("phase" if result.scene.n <= len(CYCLE) else "space").__ne__)
     kinds += section + motion if count else motion + section
     kinds += ["end", "network"]
@@ -122,7 +121,7 @@ def _along(data: xr.Dataset, result: Result) -> tuple[np.ndarray, str]:
 
 
 def _line_style(x: np.ndarray, name: str) -> dict[str, Any]:
-    """Style values over an axis: a line, with dots if they are few; dots alone for realisations, which have no order."""
+    """Return the style over an axis: a line, with dots for few values; only dots for realisations, without order."""
     unordered = name == REALISATION
     return {"linestyle": "none" if unordered else "-", "marker": "." if unordered or len(x) <= MARKED else None}
 
@@ -133,10 +132,10 @@ def _error(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) 
     order, error = np.argsort(x, kind="stable"), data.sync_error.values
     axes.plot(x[order], error[order], **line_style(style, color=BLUE, **_line_style(x, name)))
     axes.set(xlabel=symbol(name), ylabel="average synchronisation error")
-    if np.nanmax(error, initial=0.0) < ROUNDING:  # do not enlarge rounding errors to the full height
+    if np.nanmax(error, initial=0.0) < ROUNDING:  # do not scale rounding errors to the full height
         axes.set_ylim(-0.05 * ROUNDING, ROUNDING)
     elif np.nanmax(error) > DECADES * (least := float(np.nanmin(error[error > ROUNDING]))):
-        # decades of errors, and a linear scale from zero to the smallest that is no rounding error
+        # logarithmic scale, and linear from zero to the smallest error above rounding
         axes.set_yscale("symlog", linthresh=least, linscale=1.0)
         axes.set_ylim(bottom=0.0)
 
@@ -176,7 +175,7 @@ def _section(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]
         markeredgewidth=0.0,
         color=BLACK,
         rasterized=True,
-        # small and half transparent where many values of a parameter have many points
+        # small, half transparent dots for many values of a parameter with many points
         markersize=3.0 if x is None else float(np.clip(700.0 / len(x[0]), 1.0, 3.0)),
         alpha=1.0 if x is None or len(x[0]) <= MARKED else 0.5,
     )
@@ -213,7 +212,7 @@ def _time(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -
 
 
 def _phase(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
-    """Draw the second state of each node over its first: a line, or dots where samples are too few for one."""
+    """Draw the second state of each node over its first: a line, or dots if the samples are too few for a line."""
     first, second = (node_states(data.trajectory, result, k) for k in (0, 1))
     x, y = first.values.T, second.values.T
     # angles between successive chords, each state in units of its range
@@ -252,7 +251,7 @@ def _network(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]
 
 
 def node_states(values: xr.DataArray, result: Result, k: int) -> xr.DataArray:
-    """Return the first (`k` = 0) or second state of each node, the first one if a node has no second; nodes last."""
+    """Return the first (`k` = 0) or second (`k` = 1) state of each node, nodes last; the first if there is no second."""
     equations = result.scene.equations
     state_names = [{s.name for s in node.state} for node in equations.nodes]
     components = [[name for name in equations.components if name in names] for names in state_names]
@@ -305,7 +304,7 @@ def _widen(axes: Axes) -> None:
             set_limits(0.5 * (low + high - least), 0.5 * (low + high + least))
 
 
-_DRAWING = {  # function of each kind, and the number of axes of parameters that it draws over
+_DRAWING = {  # for each kind its function, and the number of swept axes in the plot
     "error": (_error, 1),
     "section": (_section, 1),
     "map": (_map, 2),

@@ -1,10 +1,9 @@
-"""Appearance of the figures, and writing their files.
+"""Style of the figures, and functions that write their files.
 
-Every figure has an opaque white ground, so that it reads the same on paper, on a light and on a
-dark screen. Colours are those of Okabe & Ito (https://jfly.uni-koeln.de/color/), which stay
-distinct for colour-blind readers; line style or position repeats their meaning. Widths fit one
-column of a journal (88 mm) without scaling, with text of 7 to 8 points. Files depend on the numbers
-alone: no dates, fixed ids. Text in SVG files stays text.
+Every figure has an opaque white background, so that it looks the same on paper and on light and dark screens. The
+colours of Okabe & Ito (https://jfly.uni-koeln.de/color/) are distinct for colour-blind readers; line style or position
+repeats their meaning. Widths fit one column of a journal (88 mm) without scaling, with text of 7 to 8 points. Files
+depend only on the numbers: they contain no dates, and fixed ids. Text in SVG files stays text.
 """
 
 from __future__ import annotations
@@ -68,12 +67,12 @@ SETTINGS: dict[str, Any] = {
     "path.simplify": True,
     "image.composite_image": True,
 }
-"""Settings of matplotlib for all figures; those that are not listed have matplotlib's defaults."""
+"""Settings of matplotlib for all figures; all other settings have the defaults of matplotlib."""
 
 
 @contextmanager
 def context() -> Iterator[None]:
-    """Use matplotlib with this style, whatever the user's settings, which return afterwards."""
+    """Use matplotlib with this style; restore the settings of the user afterwards."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(SETTINGS)
@@ -143,7 +142,7 @@ def bracket(axes: Axes, intervals: Sequence[Interval], height: float, color: str
 
 
 def note(axes: Axes, text: str) -> None:
-    """Write a remark above the axes at the right, if there is any."""
+    """Write a remark above the axes at the right; skip an empty text."""
     if text:
         axes.annotate(
             text,

@@ -1,1 +1,1 @@
-"""Synchronisability of networks from spectra and stable ranges: may know no simulation."""
+"""Synchronisability of networks from spectra and stable ranges. Imports no simulation."""

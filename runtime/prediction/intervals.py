@@ -12,7 +12,7 @@ Predicate = Callable[[np.ndarray], np.ndarray]
 """Maps an array of points to an array of truth values."""
 
 ROUNDING = 8.0 * float(np.finfo(float).eps)
-"""Least width of a bracket relative to its ends; points inside a narrower one are equal by rounding."""
+"""Least width of a bracket relative to its ends; inside a narrower bracket points are equal by rounding."""
 
 
 def grid_intervals(x: np.ndarray, good: np.ndarray) -> list[Interval]:
@@ -30,10 +30,10 @@ def find(
 ) -> tuple[list[Interval], np.ndarray]:
     """Find the intervals on which a predicate holds.
 
-    Between neighbours of the grid that differ, `fan` equally spaced points are evaluated, and the
-    bracket narrows to the change next to the good end, until it is narrower than `resolution`. The
-    reported end is its middle. Intervals that fit between two grid points are not found.
-    Shapes: x (k,), resolution (k - 1,); returns verdict (k,).
+    Two neighbours of the grid with different truth values form a bracket. `fan` equally spaced points in the bracket
+    are evaluated, and the bracket narrows to the change next to its good end, until narrower than `resolution`. The
+    reported end of an interval is the middle of the bracket. Intervals between neighbours of the grid are not found.
+    Shapes: x (k,), resolution (k - 1,); returns verdict (k,), the truth values on the grid.
     """
     x = np.asarray(x, dtype=float)
     if x.ndim != 1 or len(x) < 1 or np.any(np.diff(x) <= 0):
@@ -47,7 +47,7 @@ def find(
 def refine(
     judge: Predicate, x: np.ndarray, verdict: np.ndarray, resolution: float | np.ndarray, fan: int = 7
 ) -> list[Interval]:
-    """Return the intervals of `find` from the verdict on the grid. Shapes: x (k,), verdict (k,)."""
+    """Return the intervals of `find` from the truth values `verdict` on the grid. Shapes: x (k,), verdict (k,)."""
     changes = np.flatnonzero(verdict[1:] != verdict[:-1])
     good = np.where(verdict[changes], x[changes], x[changes + 1])
     bad = np.where(verdict[changes], x[changes + 1], x[changes])
@@ -55,7 +55,7 @@ def refine(
     while True:
         finest = ROUNDING * np.maximum(np.abs(good), np.abs(bad))
         wide = np.flatnonzero(np.abs(bad - good) > np.maximum(wanted, finest))
-        if not len(wide):  # all brackets are narrow enough, or at the limit of rounding
+        if not len(wide):  # all brackets are narrower than the resolution, or at the limit of rounding
             break
         good[wide], bad[wide] = _narrow(judge, good[wide], bad[wide], fan)
     ends = list(0.5 * (good + bad))
@@ -67,7 +67,7 @@ def refine(
 
 
 def _narrow(judge: Predicate, good: np.ndarray, bad: np.ndarray, fan: int) -> tuple[np.ndarray, np.ndarray]:
-    """Evaluate points in every bracket and keep the part at the first change from good to bad."""
+    """Evaluate points in every bracket; narrow each to the first change from good to bad."""
     parts = np.arange(1, fan + 1) / (fan + 1)
     points = good[:, None] + (bad - good)[:, None] * parts
     verdict = np.asarray(judge(points.reshape(-1)), dtype=bool).reshape(points.shape)
@@ -85,7 +85,7 @@ def scale(intervals: Sequence[Interval], factor: float) -> list[Interval]:
 
 
 def intersect(left: Sequence[Interval], right: Sequence[Interval]) -> list[Interval]:
-    """Intersect two sets."""
+    """Return the intersection of two sets of intervals."""
     intervals = []
     for a, b in left:
         for c, d in right:

@@ -1,9 +1,9 @@
-"""The largest network of a family that can synchronise, from its eigenratio.
+"""The largest network of a family that can synchronise, from the eigenratio.
 
-Eigenratios (largest over smallest non-zero |gamma|) that grow with the size of the network, in
-closed form: chain cot²(π/2n); ring 1/sin²(π/n) for even n, 1/(4 sin²(π/2n)) for odd n; star n;
-hypercube its dimension; complete 1. Those with an angle are rational only if cos(π/n), for the even
-ring cos(2π/n), is 0, ±1/2 or ±1, so that balls decide every other comparison.
+The eigenratio is the largest over the smallest non-zero |gamma|. In these families it has a closed form that does not
+decrease with the size: chain cot²(π/2n); ring 1/sin²(π/n) for even n, 1/(4 sin²(π/2n)) for odd n; star n; hypercube its
+dimension; complete graph 1. The ratios of chain and ring are rational only if cos(π/n), for the even ring cos(2π/n), is
+0, ±1/2 or ±1. Interval arithmetic (balls) therefore decides every other comparison with a rational number.
 
 Sources: spectra, Brouwer & Haemers, Spectra of Graphs (Springer, 2012), section 1.4; rational
 values, I. Niven, Irrational Numbers, Carus Math. Monographs 11 (1956), corollary 3.12.
@@ -29,18 +29,17 @@ __all__ = ["LargestNetwork", "Method", "SizeUnit", "eigenratio", "largest_networ
 
 
 class SizeUnit(StrEnum):
-    """What the size of a network counts."""
+    """The quantity that measures the size of a network."""
 
     NODES = "nodes"
     DIMENSION = "dimension"
 
 
 class Method(StrEnum):
-    """How the largest network was determined.
+    """The method that determined the largest network.
 
-    CLOSED_FORM: no larger network can synchronise. OPEN_RANGE: a range that starts at alpha = 0 or
-    has no end admits every connected network. SEARCH: larger networks than the limit were not
-    tried.
+    CLOSED_FORM: no larger network can synchronise. OPEN_RANGE: every connected network can synchronise, because a range
+    starts at alpha = 0 or has no upper end. SEARCH: networks larger than the limit were not tried.
     """
 
     CLOSED_FORM = "closed form"
@@ -56,9 +55,9 @@ class LargestNetwork:
     """
 
     family: str  # name of the family
-    n: int | None  # largest size for the ranges as stated
-    certain: int | None  # largest size for all ranges within their errors
-    possible: int | None  # largest size for at least one choice of ranges within their errors
+    n: int | None  # largest size for the given ranges
+    certain: int | None  # largest size that can synchronise for every choice of the ends within their errors
+    possible: int | None  # largest size that can synchronise for some choice of the ends within their errors
     counts: SizeUnit  # what the size counts
     how: Method  # how the size was determined
     limit: int | None = None  # largest number of nodes that the search tried
@@ -72,8 +71,8 @@ def largest_network(
 ) -> LargestNetwork:
     """Find the largest network of a family that can synchronise, decided exactly.
 
-    A single range with a closed form of the eigenratio (see CLOSED), or a range that starts at 0 or
-    has no end, give a result for all sizes. Otherwise every network up to the limit is tried.
+    The result holds for all sizes if there is a single range and the eigenratio has a closed form (see CLOSED), or if a
+    range starts at 0 or has no upper end. Otherwise every network up to the limit is tried.
     """
     if limit < 2:
         raise ValueError(f"limit = {limit}; expected at least 2 nodes")
@@ -91,7 +90,7 @@ def largest_network(
 
 
 def _open(ranges: Sequence[StableRange]) -> bool:
-    """Return whether one range admits every eigenratio: some alpha > 0, from 0 or without end."""
+    """Return True if a range admits every eigenratio: it contains some alpha > 0, and starts at 0 or has no end."""
     return any(r.high is None or (r.low == 0 and r.high > 0) for r in ranges)
 
 
@@ -118,7 +117,7 @@ def _by_ratio(family: str, ranges: Sequence[StableRange]) -> int | None:
 
 
 def _fits(ratio: Callable[[int], Ball], n: int, allowed: Fraction) -> bool:
-    """Return whether the ratio at n is at most the allowed one; refine balls until they decide."""
+    """Return True if ratio(n) <= allowed; increase the precision of the balls until they decide."""
     bound, bits = fmpq(allowed.numerator, allowed.denominator), 64
     while True:
         with precision(bits + 4 * n.bit_length()):
@@ -153,7 +152,7 @@ CLOSED: dict[str, tuple[int, Callable[[int], Ball] | None]] = {
     "ring": (3, _ring),
     "star": (2, _itself),
 }
-"""Smallest size and eigenratio by size (None: always 1) of the families with a closed form."""
+"""For each family with a closed form: smallest size, and the eigenratio as a function of size (None: always 1)."""
 
 
 def eigenratio(family: str, n: int) -> Ball:

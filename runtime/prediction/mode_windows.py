@@ -11,7 +11,7 @@ from synchain.models.spectra.eigenvalue import Eigenvalue
 from synchain.models.spectra.jordan import geometric_multiplicity
 
 VECTOR_LIMIT = 2000
-"""Most nodes for which an eigenvector is computed, since the matrix is dense: 32 MB (a choice)."""
+"""Most nodes for which an eigenvector is computed (a choice); the matrix is dense and then takes 32 MB."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class NetworkMode:
     """A distinct non-zero eigenvalue of a network."""
 
     graph: Topology = field(repr=False)
-    number: int  # position in the spectrum, counted with multiplicities; 0 is the synchronous motion
+    number: int  # index in the spectrum, counted with multiplicities; 0 is the synchronous motion
     eigenvalue: Eigenvalue  # eigenvalue gamma
 
     def __repr__(self) -> str:
@@ -37,24 +37,24 @@ class NetworkMode:
 
     @property
     def defective(self) -> bool:
-        """Whether there are fewer independent eigenvectors than the multiplicity (exact rank)."""
+        """True if there are fewer independent eigenvectors than the multiplicity (exact rank)."""
         return geometric_multiplicity(self.graph, self.eigenvalue) < self.multiplicity
 
     @property
     def vector(self) -> np.ndarray:
         """Unit eigenvector (n,) whose largest entry is positive; complex if the eigenvalue is.
 
-        Of a multiple eigenvalue, the vector most localised at a single oscillator, at the first of
-        equals.
+        For a multiple eigenvalue, return the vector that is most localised at a single oscillator; of equally localised
+        vectors, the vector at the first oscillator.
         """
         n = self.graph.n
         if n > VECTOR_LIMIT:
             raise ValueError(f"eigenvector of {self.graph.name}({n}): expected at most {VECTOR_LIMIT} nodes")
-        # The null space of G - gamma I, by the right singular vectors of the smallest singular values.
+        # Basis of the null space of G - gamma I: the right singular vectors of the smallest singular values.
         shifted = np.array([[float(x) for x in row] for row in self.graph.rows]) - self.eigenvalue.value * np.eye(n)
         independent = geometric_multiplicity(self.graph, self.eigenvalue)
         basis = np.linalg.svd(shifted)[2][n - independent :].conj().T
-        # The projection of a node's unit vector on this space is largest for the node of largest weight.
+        # Project the unit vector of each node onto the null space; choose the node with the longest projection.
         weight = np.sum(np.abs(basis) ** 2, axis=1)
         column = basis @ basis[int(np.argmax(weight >= weight.max() - 1e-9))].conj()
         return np.asarray(column / np.linalg.norm(column))
@@ -71,11 +71,11 @@ def transversal_modes(graph: Topology) -> tuple[NetworkMode, ...]:
 
 
 def defective_rows(graph: Topology) -> list[tuple[str, str]]:
-    """Return a row for each eigenvalue that lacks eigenvectors: how errors grow if its exponent is lambda."""
+    """Return a row for each defective eigenvalue: the growth t^p e^(lambda t) of errors, for the exponent lambda."""
     powers = [(e, e.blocks[0][0] - 1 if e.blocks else 0) for e in graph.spectrum.defective]
     return [("defective", f"gamma = {e}: growth t{f'^{p}' if p > 1 else ''} e^(lambda t)") for e, p in powers]
 
 
 def has_loose_parts(graph: Topology) -> bool:
-    """Return whether 0 is a multiple eigenvalue: no coupling connects some parts of the network."""
+    """Return True if 0 is a multiple eigenvalue: some parts of the network are not connected."""
     return graph.spectrum.zeros > 1

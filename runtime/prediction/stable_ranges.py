@@ -18,9 +18,9 @@ class StableRange:
 
     @property
     def ratio(self) -> float:
-        """high / low, the largest eigenratio that fits.
+        """high / low, the largest eigenratio of a network whose modes all fit into the range.
 
-        It is infinite from 0 or without end, and 0 for alpha = 0 alone.
+        The ratio is infinite for a range from 0 or without an upper end, and 0 for the single point alpha = 0.
         """
         if self.high is None:
             return math.inf
@@ -52,7 +52,7 @@ def exact_ranges(
             end = None if high == math.inf else _exact(high)
             uncertainties = (float(below) if low > 0 else 0.0, float(above) if end is not None else 0.0)
             begin = max(_exact(low), Fraction(0))
-            if touches and exact:  # closed ranges that touch are one
+            if touches and exact:  # join closed ranges that touch
                 joined = exact.pop()
                 begin, uncertainties = joined.low, (joined.errors[0], uncertainties[1])
             exact.append(StableRange(begin, end, uncertainties))
@@ -65,7 +65,7 @@ def _exact(x: float) -> Fraction:
 
 
 def widen(ranges: Sequence[StableRange], sign: int) -> list[StableRange]:
-    """Widen or narrow ranges by their errors."""
+    """Widen (`sign` = 1) or narrow (`sign` = -1) ranges by their errors."""
     widened: list[StableRange] = []
     for r in ranges:
         below, above = (sign * Fraction(e) for e in r.errors)

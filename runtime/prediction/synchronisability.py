@@ -1,14 +1,14 @@
 """Synchronisability of networks from the stable ranges of a master stability function.
 
-A transversal mode with the eigenvalue gamma < 0 has the strength alpha = sigma |gamma|. The network
-is stable at sigma if every mode lies in a stable range. For one range from a to b that is possible
-if the eigenratio, largest over smallest non-zero |gamma|, is at most b / a. Ranges are closed here:
-a ratio that is exactly b / a leaves a single sigma. Ends count as the exact binary numbers that the
-floats are, and eigenvalues are exact algebraic numbers; only the reported sigma are rounded.
+A transversal mode with the eigenvalue gamma < 0 has the strength alpha = sigma |gamma|. The network is stable at sigma
+if the strength of every mode lies in a stable range. With one range from a to b, a stable sigma exists if the
+eigenratio (largest over smallest non-zero |gamma|) is at most b / a. Ranges are closed: if the eigenratio equals b / a,
+a single sigma is stable. The ends of ranges are the exact binary values of floats, and eigenvalues are exact algebraic
+numbers; only the reported sigma are rounded.
 
-Complex eigenvalues give complex alpha = -sigma gamma, against a stable region of the complex plane.
-If eigenvectors are missing (a feed-forward chain), the equations of the modes do not decouple, but
-the condition on the eigenvalues stays.
+Complex eigenvalues give complex strengths alpha = -sigma gamma, which must lie in a stable region of the complex plane.
+If eigenvectors are missing (a feed-forward chain), the equations of the modes do not decouple, but the condition on the
+eigenvalues is the same.
 
 Sources: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998): real and complex alpha; Barahona &
 Pecora, Phys. Rev. Lett. 89, 054101 (2002): the eigenratio; Stefański, Perlikowski & Kapitaniak,
@@ -58,10 +58,10 @@ class Answer(StrEnum):
 
 
 Region = Callable[[np.ndarray], np.ndarray]
-"""Maps complex alpha (m,) with an imaginary part >= 0 to truth values (m,)."""
+"""Function that returns for complex alpha (m,), with imaginary part >= 0, True where the mode is stable (m,)."""
 
 LONGEST = 60
-"""Most letters of an exact ratio that is shown (a choice)."""
+"""Most characters of an exact ratio in texts (a choice)."""
 
 _EVERYTHING = StableRange(Fraction(0), None)
 
@@ -72,10 +72,10 @@ class Window:
 
     low: float  # ends of the interval
     high: float
-    # uncertainties of the ends, in sigma: infinite at the end of a grid, since the window may go on; 0 at sigma = 0
+    # uncertainties of the ends in sigma: infinite at an end of the grid, where the window may continue; 0 at sigma = 0
     low_error: float
     high_error: float
-    # first mode that is lost beyond the end; None if the end is 0, infinite, or the end of a grid
+    # first mode that becomes unstable beyond the end; None if the end is 0, infinite, or an end of the grid
     low_mode: NetworkMode | None
     high_mode: NetworkMode | None
 
@@ -83,7 +83,7 @@ class Window:
         return f"Window(sigma {self.text()})"
 
     def text(self, errors: bool = True) -> str:
-        """Return the ends, with their errors, and the modes lost there; dots follow an end of a grid, where none is lost."""
+        """Return the ends with errors, and the modes that become unstable there; dots mark an end of the grid."""
         ends = ((self.low, self.low_mode, "below"), (self.high, self.high_mode, "above"))
         cut = [sigma for sigma, mode, _ in ends if mode is None and 0.0 < abs(sigma) < math.inf]
         lost = [f"lost {side}: gamma = {mode.eigenvalue}" for _, mode, side in ends if mode is not None]
@@ -91,7 +91,7 @@ class Window:
         return "; ".join([interval_text([(self.low, self.high)], spread, cut), *lost])
 
     def as_dict(self) -> dict[str, object]:
-        """Return the window for JSON; a mode is its exact eigenvalue, or None."""
+        """Return the window in JSON types; a mode is represented by its exact eigenvalue, or None."""
         names = ("low", "high", "low_error", "high_error")
         modes = {name: _exact(getattr(self, name)) for name in ("low_mode", "high_mode")}
         return {**{name: getattr(self, name) for name in names}, **modes}
@@ -99,22 +99,22 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether a network can synchronise for some sigma > 0, and why."""
+    """The answer whether a network can synchronise for some sigma > 0, with the reason."""
 
     answer: Answer  # the decision
-    ratio: sp.Expr | None  # exact eigenratio if it is short
+    ratio: sp.Expr | None  # exact eigenratio; None if the expression is long
     ratio_value: float  # eigenratio; nan without coupled modes
     allowed: float  # largest ratio of the ends of a range
     slowest: NetworkMode | None  # modes of smallest and largest |gamma|
     fastest: NetworkMode | None
-    windows: tuple[Window, ...]  # windows for the ranges as stated
+    windows: tuple[Window, ...]  # windows for the given ranges
 
     def __repr__(self) -> str:
         return f"Verdict({self.text})"
 
     @property
     def text(self) -> str:
-        """The answer, with the eigenratio and the one that the ranges allow."""
+        """The answer, with the eigenratio of the network and the largest ratio that the ranges allow."""
         if math.isnan(self.ratio_value):
             return str(self.answer)
         exact = "" if self.ratio is None or self.ratio.is_Rational else f"{self.ratio} = "
@@ -122,7 +122,7 @@ class Verdict:
         return f"{self.answer} (largest over smallest |gamma|: {exact}{self.ratio_value:.6g}; allowed: {allowed})"
 
     def as_dict(self) -> dict[str, object]:
-        """Return the verdict for JSON, without its windows; a mode is its exact eigenvalue."""
+        """Return the verdict without windows in JSON types; a mode is represented by its exact eigenvalue."""
         return {
             "answer": str(self.answer),
             "ratio": None if self.ratio is None else str(self.ratio),
@@ -143,13 +143,13 @@ class OneWay:
     """Windows of a network with complex eigenvalues."""
 
     windows: tuple[Window, ...]  # windows of sigma
-    # modes that lack eigenvectors: their errors may grow at first, but vanish in the end
+    # modes that lack eigenvectors: deviations may grow at first, and decay in the end
     defective: tuple[NetworkMode, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """sigma = alpha / |gamma| of a mode at an end of a range; without a mode the end of 0 … infinity."""
+    """An end of a window: sigma = alpha / |gamma| of a mode at an end of a range; without a mode 0 or infinity."""
 
     range: StableRange
     upper: bool
@@ -182,7 +182,7 @@ def windows(
         Window(low.sigma, high.sigma, low.error, high.error, low.mode, high.mode)
         for low, high in _intersection(exact_ranges(ranges, errors), graph)
     ]
-    # Ranges below 0: mirror them, find the windows of -sigma, and mirror those.
+    # Ranges below 0: mirror the ranges, find the windows of -sigma, and mirror the windows.
     pairs = zip(ranges, [(0.0, 0.0)] * len(ranges) if errors is None else errors, strict=True)
     mirrored = [((max(-high, 0.0), -low), error[::-1]) for (low, high), error in reversed(list(pairs)) if low < 0.0]
     if not mirrored:
@@ -192,7 +192,7 @@ def windows(
         Window(0.0 - high.sigma, 0.0 - low.sigma, high.error, low.error, high.mode, low.mode)
         for low, high in reversed(_intersection(exact, graph))
     ]
-    # Windows that meet at sigma = 0 are one.
+    # Join windows that meet at sigma = 0.
     if below and above and below[-1].high == above[0].low:
         right = above.pop(0)
         if right.high > 0.0:
@@ -205,15 +205,15 @@ def windows_complex(
 ) -> OneWay:
     """Find the intervals of sigma on which every mode lies in a stable region of the complex plane.
 
-    They are found on a grid and refined by bisection.
+    The intervals are found on a grid and refined by bisection.
     Shapes: sigma_grid (k,).
     """
-    # Of a conjugate pair one mode is enough; unconnected parts add a mode with gamma = 0.
+    # Take one mode of each conjugate pair; unconnected parts add a mode with gamma = 0.
     modes = tuple(mode for mode in transversal_modes(graph) if complex(mode.eigenvalue.value).imag <= 0)
     values = np.array([mode.eigenvalue.value for mode in modes] + [0.0] * has_loose_parts(graph), dtype=complex)
 
     def verdicts(sigma: np.ndarray) -> np.ndarray:
-        """Return whether each mode is stable at each sigma. Shapes: sigma (m,); returns (m, modes)."""
+        """Return True where a mode is stable at a sigma. Shapes: sigma (m,); returns (m, modes)."""
         alpha = -np.multiply.outer(sigma, values)
         answer = np.asarray(stable(alpha.ravel() + 0.0), dtype=bool)
         if answer.shape != (alpha.size,):
@@ -232,10 +232,10 @@ def windows_complex(
     reach = 0.5 * resolution
 
     def error_and_mode(end: float, step: float) -> tuple[float, NetworkMode | None]:
-        """Return the error of an end and the mode lost a step beyond it."""
+        """Return the error of an end, and the mode that is unstable a step beyond the end."""
         if grid[0] < end < grid[-1]:
             return reach, lost(end + step)
-        # The window may go on beyond the grid, but for sigma = 0, where couplings begin.
+        # No mode is lost: at an end of the grid the window may continue, except at 0, where couplings begin.
         return (0.0 if end == 0.0 else math.inf), None
 
     windows = []
@@ -265,18 +265,18 @@ def verdict(
 
 
 def possible(ranges: Sequence[StableRange], graph: Topology) -> bool:
-    """Decide whether some sigma > 0 puts every mode of a graph into one of the exact ranges."""
+    """Return True if for some sigma > 0 every mode of a graph lies in one of the exact ranges."""
     ends = [high for _, high in _intersection(ranges, graph)]
     return any(high.alpha is None or (high.mode is not None and high.alpha > 0) for high in ends)
 
 
 def _intersection(ranges: Sequence[StableRange], graph: Topology) -> list[tuple[_End, _End]]:
-    """Return the windows as pairs of exact ends."""
+    """Return the windows of sigma as pairs of exact ends."""
     modes = _real_modes(graph)
-    # Between unconnected parts deviations have alpha = 0.
+    # Deviations between unconnected parts have alpha = 0, which must be stable.
     if has_loose_parts(graph) and not any(r.low == 0 for r in ranges):
         return []
-    # Start with all sigma, and keep what each mode allows.
+    # Start with all sigma, and intersect with the ranges of each mode.
     allowed = [(_End(_EVERYTHING, False, None), _End(_EVERYTHING, True, None))]
     for mode in modes:
         ends = [(_End(r, False, mode), _End(r, True, mode)) for r in ranges]

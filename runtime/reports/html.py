@@ -1,6 +1,6 @@
-"""Values as HTML for notebooks and as LaTeX: short, escaped, without scripts.
+"""Convert values to HTML for notebooks and to LaTeX: short, escaped, without scripts.
 
-Colours are those of the page around, so that all reads on a light and on a dark ground.
+Fragments inherit the colours of the page, so that they are readable on light and dark backgrounds.
 """
 
 from __future__ import annotations
@@ -47,22 +47,22 @@ vertical-align:middle}
 .synchain img{max-width:100%;background:#fff}
 .synchain .quiet{opacity:.75}
 """
-"""Rules for all fragments; colours are those of the page around."""
+"""Style rules of all fragments; fragments inherit the colours of the page."""
 
 LINES, ROWS = 14, 12
 """Most lines of equations, and most rows of a table (a choice)."""
 
 LONG = 400
-"""Characters of LaTeX above which an equation is plain text, whose lines break."""
+"""Most characters of LaTeX of an equation; a longer equation is shown as plain text, whose lines can break."""
 
 EXACT = 40
-"""Largest graph without a closed form whose spectrum is computed to be shown."""
+"""Most nodes of a graph without a closed form whose spectrum is computed for display."""
 
 PLAIN = ExpressionWriter(Latex(), {}, frozenset())
 
 
 def fragment(value: object) -> str:
-    """Return a value as HTML that can stand in a page of others."""
+    """Return a value as HTML that can be inserted into a page."""
     return f'<style>{STYLE}</style><div class="synchain">{body(value)}</div>'
 
 
@@ -137,7 +137,7 @@ def rows_table(rows: Iterable[tuple[str, str]]) -> str:
 
 
 def figure(plot: Callable[[Axes], Axes], description: str) -> str:
-    """Return a plot as an image that is part of the page; pyplot has no part in it."""
+    """Return a plot as an image embedded in the page, drawn without pyplot."""
     from ..plots.canvas import SIZE
     from ..plots.style import context, new_figure
 
@@ -151,7 +151,7 @@ def figure(plot: Callable[[Axes], Axes], description: str) -> str:
 
 
 def spectrum_of(graph: Topology) -> Spectrum | None:
-    """Return the exact spectrum if it takes no time: of a closed form, or of a small graph."""
+    """Return the exact spectrum if fast to compute (a closed form or a small graph), else None."""
     return graph.spectrum if graph.n <= EXACT or graph.closed_form() is not None else None
 
 
@@ -203,7 +203,7 @@ def _oscillators(scene: Scene) -> str:
 
 
 def _records(scene: Scene) -> list[tuple[str, str]]:
-    """Return what is recorded, and for which cells."""
+    """Return the rows on records and cells."""
     record = ", ".join(map(str, scene.record)) or "the end of the window only"
     if "section" in scene.record:
         record += f" ({scene.section})"
@@ -224,7 +224,7 @@ def _few(texts: Sequence[str], most: int = 12) -> str:
 
 
 def _short(equations: Equations) -> bool:
-    """Return whether all equations are shown."""
+    """Return True if the equations are few enough to show all."""
     return len(list(islice(lines(equations, Latex()), LINES + 1))) <= LINES
 
 
@@ -240,7 +240,7 @@ def _chosen(spectrum: Spectrum) -> list[Eigenvalue]:
 
 
 def _exact(e: Eigenvalue) -> str:
-    """Return an eigenvalue as LaTeX; a root of a long polynomial by its decimals."""
+    """Return an eigenvalue as LaTeX, or as a decimal number if it is a root of a long polynomial."""
     if isinstance(e.number, sp.Expr) and not e.number.atoms(sp.Piecewise):
         return PLAIN.write(e.number)
     return f"\\text{{{e}}}"

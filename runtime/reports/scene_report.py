@@ -1,6 +1,6 @@
-"""One page of HTML on a scene: equations, graph, exact spectrum, stability, a sweep, origin.
+"""Report of a scene as one page of HTML: equations, graph, exact spectrum, stability, a sweep, provenance.
 
-The page is complete in itself: no script, no font, no image is loaded from elsewhere.
+The page is self-contained: it loads no script, font or image.
 """
 
 from __future__ import annotations
@@ -45,16 +45,16 @@ POLICY = (
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """How much a report computes."""
+    """Numerical effort of a report."""
 
     strengths: int = 241  # number of strengths of the master stability function
     precision: float = 1e-3  # as for `synchain.runtime.exponents`
     periods: float = 5000.0
-    values: int | None = None  # most values of each axis of the sweep; None runs it as it is
+    values: int | None = None  # largest number of values of each axis of the sweep; None for all values
 
 
 QUICK = Effort(strengths=61, precision=1e-2, periods=300.0, values=25)
-"""For a first look."""
+"""Effort for a first look."""
 
 
 def report(
@@ -86,7 +86,7 @@ def _section(name: str, content: str) -> str:
 
 
 def _stability(scene: Scene, effort: Effort, workers: int | None, show_progress: bool | None) -> str:
-    """Return the function with its windows, or the reason why there is none."""
+    """Return the master stability function with its windows, or the reason why there is none."""
     try:
         function = msf(
             scene.replace(axes=()),
@@ -103,7 +103,7 @@ def _stability(scene: Scene, effort: Effort, workers: int | None, show_progress:
 
 
 def _ends(function: MSF) -> str:
-    """Return a sentence if a range may go on beyond the grid; strengths begin at 0."""
+    """Return a sentence if a stable range may continue beyond the grid; strengths begin at 0."""
     first, last = function.fine.alpha[[0, -1]]
     cut = [low for low, _ in function.intervals if low == first != 0.0]
     cut += [high for _, high in function.intervals if high == last]
@@ -112,14 +112,14 @@ def _ends(function: MSF) -> str:
 
 
 def _fixed(scene: Scene) -> str:
-    """Return a sentence if the sweep changes more than the strength."""
+    """Return a sentence if the sweep changes other parameters than the strength, which the function keeps fixed."""
     moved = [axis.name for axis in scene.axes if axis.name != scene.strength]
     text = f"The sweep moves {', '.join(moved)}; this function is that of the scene's own values."
     return f'<p class="quiet">{escape(text)}</p>' if moved else ""
 
 
 def _sweep(scene: Scene, effort: Effort, workers: int | None, show_progress: bool | None) -> str:
-    """Return the sweep of the scene, with at most the values of the effort."""
+    """Run the sweep of the scene, thinned to the values of the effort, and return it as HTML."""
     thinned = scene.replace(axes=tuple(_thinned(axis, effort.values) for axis in scene.axes))
     result = run(thinned, workers=workers, show_progress=show_progress)
     plain = [None] if not scene.observe or {"sync_error", "section"} & set(scene.record) else []
@@ -129,7 +129,7 @@ def _sweep(scene: Scene, effort: Effort, workers: int | None, show_progress: boo
 
 
 def _thinned(axis: Axis, most: int | None) -> Axis:
-    """Return at most `most` values of an axis, both ends among them."""
+    """Thin an axis to at most `most` values, including both ends."""
     if most is None or len(axis) <= most:
         return axis
     indices = np.unique(np.linspace(0, len(axis) - 1, most).round().astype(int))
