@@ -43,7 +43,7 @@ class _Compiler(Compiler):
                 return compiler.FrontEnd(*self.arguments, inner=self.inner, noinline=self.noinline).compile_extra(func)
             except Exception as error:  # another version of Numba may raise anything
                 problem = f"{func.__name__}: {type(error).__name__}: {' '.join(str(error).split())}"
-        # A function with an error in itself fails here too, with Numba's message, and is no problem of the front end.
+        # A faulty function fails here too, with Numba's message, and is not recorded as a problem of the front end.
         compiled = super().compile_extra(func)
         if problem:
             front_end_problems.append(problem)

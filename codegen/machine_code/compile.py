@@ -176,7 +176,7 @@ def _check_numba() -> None:
 
 @functools.lru_cache(maxsize=16)  # the last kernels stay loaded, for functions that run one scene again and again
 def _load(source: KernelSource) -> Kernel:
-    with _lock:  # not around the cached call: a loaded kernel waits for no compilation
+    with _lock:  # inside the cached function, so that a call for a loaded kernel never waits
         kernel = _kernels.get(source)
         if kernel is None:
             kernel = _kernels[source] = _kernel(source)
@@ -218,7 +218,7 @@ def _kernel(source: KernelSource) -> Kernel:
         description = f"a kernel for {n} oscillator{'s' * (n != 1)} ({source.integrator})"
         wanted = {name: available[name] for name in source.functions}
         compiled = _modules[source.code] = _module(source.code, "kernel", wanted, description)
-    # The driver takes the functions of the scene and the recorders, None for those that it does not call.
+    # The driver takes the functions of the scene and the recorders; None stands for a function that it does not call.
     by_name = ChainMap(compiled.functions, *(recorder.functions for recorder in recorders))
     table = Functions(available[source.driver.entry].args[0], [by_name.get(name) for name in source.driver.functions])
     return Kernel(source, compiled, driver, (table, *source.arguments))
@@ -310,7 +310,7 @@ def _compile(text: str, path: Path, wanted: dict[str, Any], stored: bytes = b"")
         for name, function in functions.items():
             function._cache = _FunctionCache(code, name)
             function.compile(wanted[name])
-            function.disable_compile()  # arrays of another type are an error of the caller, not a reason to compile
+            function.disable_compile()  # raise for arguments of other types instead of compiling again
     finally:
         del sys.modules[path.stem]
         for name in vars(module).keys() - {"__name__"}:  # Numba never frees a function that its module refers to

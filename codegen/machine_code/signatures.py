@@ -76,7 +76,7 @@ def _of_sweep(driver: Driver) -> tuple[dict[str, Any], tuple[Any, ...], tuple[An
 
 
 def _of_modes(driver: Driver) -> tuple[dict[str, Any], tuple[Any, ...], tuple[Any, ...]]:
-    """Return the same for a driver of orbits, which have a lane of one cell, and their modes."""
+    """Return the same for a driver of orbits and their modes; an orbit is one cell in a lane of width 1."""
     one = Lane(1)
     times, result = ((one, one, one), types.UniTuple(one, 2)) if driver.series else ((one, one), one)
     registers = [INTEGER] * (1 if driver.series else 2)  # their number; without series the first and the last

@@ -176,7 +176,7 @@ def _atan_series(z):
     low = multiply_add(_four(c5, c6, c7, c8, z, z2), z4, _four(c1, c2, c3, c4, z, z2))
     middle = multiply_add(_four(d3, d4, d5, d6, z, z2), z4, _four(c9, d0, d1, d2, z, z2))
     high = multiply_add(d9, z2, multiply_add(d8, z, d7))
-    # c0, the largest, is added last, so that it is rounded only once
+    # add c0, the largest coefficient, last, so that its sum is rounded only once
     return multiply_add(multiply_add(multiply_add(high, z8, middle), z8, low), z, c0)
 
 
@@ -201,7 +201,7 @@ def _alternating_sine(x, k, shifted):
     c0, c1, c2, c3, c4, c5, c6, c7 = SINE
     high = multiply_add(c7, w, multiply_add(c6, z, c5))
     series = multiply_add(high, w * w, _four(c1, c2, c3, c4, z, w))
-    cube = multiply_add(r, z, r * fma(r, r, -z))  # with the rounding error of r**2, which would count near the crests
+    cube = multiply_add(r, z, r * fma(r, r, -z))  # corrects the rounding error of r**2, which matters near maxima
     # z <= (pi/2)**2 = 2.47; a larger one comes from an x beyond the accuracy of the reduction
     return flip_if_odd(select(z < 3.25, multiply_add(cube, multiply_add(series, z, c0), r), r * 0.0), shifted)
 
@@ -216,7 +216,7 @@ def sin(x):
 @lane_function
 def cos(x):
     """Return the cosine; NaN for infinite x, no accuracy for |x| > 1e15."""
-    # the sine a quarter turn further: k is the nearest half-integer to x/pi
+    # cos(x) = sin(x + pi/2): k is the half-integer nearest to x/pi
     shifted = multiply_add(x, ONE_OVER_PI, 0.5) + MAGIC
     return _alternating_sine(x, (shifted - MAGIC) - 0.5, shifted)
 
@@ -230,7 +230,7 @@ def tanh(x):
     below = e + 2.0
     part = below - 2.0
     below_error = ((2.0 - (below - part)) + (e - part)) + e_error
-    # one Newton step with the residual e - q below of the rounded quotient q
+    # correct the rounded quotient q by one Newton step with the residual e - q*below
     inverse = 1.0 / below
     q = e * inverse
     return copysign(select(x == x, multiply_add(fma(-q, below, e) + (e_error - q * below_error), inverse, q), x), x)
