@@ -309,7 +309,7 @@ def _of_nodes(equations: Equations, slots: dict[str, int], name: str, nodes: lis
 def _turned(
     symbols: tuple[sp.Symbol, ...], rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...]
 ) -> tuple[tuple[int, Callable[..., list[float | np.ndarray]]], ...]:
-    """Return, for each smoothed jump, the index of a state among the arguments, and its value in the middle of the jump."""
+    """Return, for each smoothed jump, the index of a state among the arguments and its value at the jump's middle."""
     return tuple((symbols.index(state), _function(symbols, (middle,))) for state, middle in turns(rates, states))
 
 

@@ -131,7 +131,7 @@ class Planner:
         return spans
 
     def extremes(self) -> CellRows:
-        """Return the rows of a few cells with the smallest and the largest value of each axis, and the one nearest to 0."""
+        """Return the rows of a few cells that contain the smallest, largest and nearest-to-0 value of each axis."""
         return self.rows(self._extremes())
 
     def sample(self) -> CellRows:

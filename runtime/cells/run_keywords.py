@@ -92,7 +92,7 @@ class Given:
             )
 
     def sweep(self, scene: Scene, **settings: object) -> Scene:
-        """Return a scene with the values of the call: a number fixes a parameter or initial state, a sequence sweeps one.
+        """Return a scene with the values of the call: numbers fix parameters or initial states, sequences sweep them.
 
         A sequence makes an axis after the axes of the scene. A setting that is None keeps the scene's.
         """

@@ -1,9 +1,9 @@
-"""Certification: stability of the synchronous state of every cell by the transversal exponents along its final motion.
+"""Certify cells: determine the stability of each cell's synchronous state by exponents along its final motion.
 
-Two oscillators can become equal bit for bit by rounding and then stay together although the state
-is unstable (Pikovsky, Phys. Rev. Lett. 73, 2931 (1994)), and a cell that starts outside the basin
-or waits too short a time is not synchronous although the state is stable.  The exponents distinguish these
-cases, and a cell that is certain to stay synchronous ends early.
+Two oscillators can become equal bit for bit by rounding, and then stay together although the synchronous state is
+unstable (Pikovsky, Phys. Rev. Lett. 73, 2931 (1994)). A cell that starts outside the basin, or has too short a
+transient, is not synchronous although the state is stable. Exponents distinguish these cases. A cell that is
+certain to stay synchronous ends early.
 """
 
 from __future__ import annotations
@@ -38,21 +38,24 @@ from .prepare import PreparedRun
 from .scheduler import BlockScheduler, Sink
 
 MOST = 10**7
-"""Cells of the largest certified sweep, a choice: exponents and verdicts of all of them are in memory."""
+"""Largest number of cells of a certified sweep: a choice; exponents and verdicts of all cells are in memory."""
 
 TRANSIENT, RTOL = 300, 1e-6
-"""Units of time before the average along an orbit, and its tolerance: choices of time."""
+"""Transient before the average along an orbit, in units of time, and relative tolerance: choices for speed."""
 
 LOOKED, STARTS = 64, 4
-"""Samples of a motion that distinguish it from others, and cells of each motion along which exponents are averaged: choices."""
+"""LOOKED: number of samples by which motions are distinguished. STARTS: number of cells of one motion along which
+exponents
+are averaged. Choices."""
 
 ALIKE, CLOSE = 0.25, 1e-3
-"""Motions with a smaller difference of means, relative to their extents and to those of all motions of a group, are one."""
+"""Two motions count as one if their means differ by less than ALIKE times their extents and less than CLOSE times the
+extent of all motions of a group."""
 
 
 @dataclass
 class _Ends(Sink):
-    """Store where the cells of a sweep end: states of the reduced network (`left`) and of the whole one."""
+    """Store the final states of the cells of a sweep: of the reduced network (`left`) and of the unreduced one."""
 
     layout: Layout
     reduction: ReducedScene
@@ -61,18 +64,18 @@ class _Ends(Sink):
     finished: np.ndarray
 
     def ends(self, block: int) -> Start:
-        """Return the final states of a block, and which of its cells finished."""
+        """Return the final states of a block, and whether each of its cells finished."""
         rows = self.layout.rows(block)
         return self.left[rows], self.finished[rows]
 
     def put(self, task: Task, buffers: Buffers) -> None:
-        """Store the ends of a block."""
+        """Store the final states of a block."""
         self.left[task.cells], self.finished[task.cells] = buffers.end, buffers.finished
         self.whole[task.cells] = self.reduction.expand(buffers).end
 
 
 def certified(prepared: PreparedRun) -> PreparedRun:
-    """Return a run with the exponents of every cell along its final motion; all cells run once for their ends."""
+    """Return a run with the exponents of every cell; run all cells once first, to find their final motions."""
     scene, layout = prepared.scene, prepared.layout()
     check_certifiable(scene)
     shape = (scene.cells, prepared.reduction.dimension), (scene.cells, len(scene.y0))
@@ -95,10 +98,10 @@ def certify(
     periods: float = 2000,
     workers: int | None = None,
 ) -> Certificate:
-    """Return the exponents along the synchronous motion of every cell, which starts from `states` (cells, states).
+    """Return the exponents along the synchronous motion of every cell; a motion starts from `states` (cells, states).
 
-    Cells that differ only in their starts and in the strength of links that vanish between equal states share the
-    exponents of each of their motions.
+    Exponents are computed once for cells that share a motion. Such cells differ only in their starts, and in the
+    strength of links that vanish between equal states.
     """
     check_certifiable(scene)
     averaging = Averaging(precision, periods, TRANSIENT, 0, Execution(workers, None, False))
@@ -108,7 +111,7 @@ def certify(
     begun = layout.table(starts if states is None else states)[:, :, 0]  # (cells, p): the first node
     table = {name: np.empty(scene.cells) for name in ("exponent", "stderr", "diffusion", "margin", "size")}
     for group in shared_orbits(scene, planner.columns(cells)):
-        # One orbit for each cell of a group, at the parameters that the group shares.
+        # Integrate one orbit for each cell of a group, at the parameters common to the group.
         single = with_numbers(scene, group.parameters, axes=(), zipped=False, continuation="none", stop=None)
         cell = coupled_cell(Given(certify), single, RTOL)
         problem = OrbitProblem.of_modes(cell, group.strengths, begun[group.cells[:1]], averaging.execution.size)
@@ -118,7 +121,7 @@ def certify(
             chosen = members[np.linspace(0, len(members) - 1, min(STARTS, len(members))).astype(int)].tolist()
             with averaging.reporter() as reporter:
                 average = along(problem, first[chosen], group.strengths, averaging, reporter)
-            # Of several attractors that resemble one another take the least stable, and of its modes the largest exponent.
+            # Of several similar attractors take the least stable, and of its modes the largest exponent.
             means = [average.by_start[list(rows)].mean(axis=0) for rows in average.groups]
             strength_of = group.place[members]
             values = np.nanmax(means, axis=0)[strength_of]
@@ -136,9 +139,9 @@ def certify(
 def _motions(
     problem: OrbitProblem, states: np.ndarray, starts: np.ndarray
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield the rows of orbits on one motion, its extent (p,), and that of all motions and `starts` (any, p) together.
+    """Yield groups of orbits on one motion: rows, extent (p,) of the motion, extent (p,) of all motions and `starts`.
 
-    Motions with equal means and extents over some units of time are one.
+    Motions with equal means and extents over some units of time count as one. Shapes: starts (any, p).
     """
     integrator = problem.integrator(states, problem.strengths[:1])
     step = problem.unit if problem.forced else problem.unit / 8
@@ -148,7 +151,7 @@ def _motions(
         path.append(integrator.state)
     mean, extent = np.mean(path, axis=0), np.ptp(path, axis=0)
     whole = np.ptp(np.concatenate([*path, starts]), axis=0)
-    # Group the rows with the first one that remains.
+    # Group the remaining rows with the first of them.
     remaining = np.arange(len(mean))
     while len(remaining):
         first = remaining[0]
@@ -157,7 +160,7 @@ def _motions(
         wider = np.abs(extent[remaining] - extent[first]) > 2.0 * allowed
         alike = ~np.any(apart | wider, axis=1) | problem.linear
         rows = remaining[alike]
-        # A forced motion was sampled at one phase of the drive only; sample it within a period.
+        # The samples of a forced motion are at one phase of the drive: add samples within a period.
         samples = within(problem, states[rows]) if problem.forced else np.array(path)[:, rows]
         yield rows, np.ptp(samples.reshape(-1, len(whole)), axis=0), whole
         remaining = remaining[~alike]

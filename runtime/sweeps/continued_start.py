@@ -1,4 +1,4 @@
-"""Runs that begin where an earlier one ended: states by their labels, and the phase of the drive."""
+"""Start a run from the end of an earlier run: match states by their labels, and check the phase of the drive."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ StartValue: TypeAlias = Result | xr.DataArray | Mapping[str, object] | Sequence[
 """Types of the argument `start`."""
 
 START_TIME = "start_time"
-"""The name in results of the time of the earlier run at which they started."""
+"""Name of an attribute, or coordinate, of results: the time of the earlier run at which the run started."""
 
 WHOLE = 1e-9
-"""Largest distance of a time from a whole number of drive periods, in periods: a choice far above rounding."""
+"""A number of drive periods within this distance of a whole number counts as whole: a choice far above rounding."""
 
 CELLS = 65536
-"""Cells of a continued sweep whose periods are computed together, which bounds the memory."""
+"""Number of cells of a continued sweep whose periods are computed at once; bounds the memory."""
 
 
 def started(scene: Scene, start: StartValue) -> tuple[Scene, float]:
-    """Return the scene with the states of one cell as its start, and the time at which they were reached."""
+    """Return the scene with the states of one cell as start, and the time at which the earlier run reached them."""
     if isinstance(start, Mapping):
         return scene.replace(initial=start), 0.0
     if isinstance(start, list | tuple | np.ndarray):
@@ -63,10 +63,10 @@ def several(start: StartValue) -> TypeGuard[Result | xr.DataArray]:
 
 
 def starts_of_cells(scene: Scene, start: Result | xr.DataArray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the states (cells, dimension) that the cells of a scene start from, and the times (axes) when they were reached.
+    """Return the initial states (cells, dimension) of a scene's cells, and the times (axes) of the earlier run.
 
-    A cell starts from that of the same values of the axes; axes that `start` lacks start from one cell.  Raises
-    ValueError as `started`, and if axes of `start` are none of the scene or have other values.
+    A cell starts from the cell with the same values of the axes. If `start` lacks an axis, all values of this axis
+    start from one cell. Raise ValueError as in `started`, and if an axis of `start` is unknown or has other values.
     """
     end, dims = start.end if isinstance(start, Result) else start, dimensions(scene)
     states = end.isel({name: 0 for name in end.dims if name in dims})
@@ -105,14 +105,14 @@ def starts_of_cells(scene: Scene, start: Result | xr.DataArray) -> tuple[np.ndar
 
 
 def with_start_times(result: Result, times: float | np.ndarray) -> Result:
-    """Return a result with the time of the earlier run at which it started, as an attribute, or as a coordinate (axes)."""
+    """Return a result with the start time in the earlier run: an attribute, or a coordinate (axes) if cells differ."""
     if isinstance(times, float):
         return Result(result.data.assign_attrs({START_TIME: times}), result.scene)
     return Result(result.data.assign_coords({START_TIME: (dimensions(result.scene), times)}), result.scene)
 
 
 def _end(start: StartValue) -> object:
-    """Return the final states of a result, of which all cells finished; any other start unchanged."""
+    """Return the final states of a result whose cells have all finished; return any other start unchanged."""
     if not isinstance(start, Result):
         return start
     if not start.success:
@@ -121,7 +121,7 @@ def _end(start: StartValue) -> object:
 
 
 def _along(values: xr.DataArray, dims: tuple[str, ...], more: tuple[str, ...] = ()) -> np.ndarray:
-    """Return values along the dimensions of a sweep, of length 1 where they lack one, then along others."""
+    """Return values with the dimensions of a sweep, then `more`; a missing dimension gets the length 1."""
     missing = [name for name in dims if name not in values.dims]
     return values.expand_dims(missing).transpose(*dims, *more).values
 
@@ -132,7 +132,7 @@ def _expect_finite(states: np.ndarray) -> None:
 
 
 def expect_whole_periods(planner: Planner) -> None:
-    """Refuse a continued sweep in which a cell ends amid a period of the drive: the next cell begins with a new period."""
+    """Raise ValueError if a cell of a continued sweep ends within a drive period: the next cell starts at phase 0."""
     scene = planner.scene
     if not (scene.continued and scene.forced) or scene.time_unit == "period":
         return
@@ -181,7 +181,7 @@ def _check_labels(scene: Scene, end: xr.DataArray) -> None:
 
 
 def _check_phases(scene: Scene, end: xr.DataArray) -> None:
-    """Raise ValueError if the drive of a cell was amid a period, where a run cannot begin."""
+    """Raise ValueError if a cell ended within a period of the drive: a run must begin with a period."""
     times = np.ravel(end.coords[END_TIME].values) if END_TIME in end.coords else np.zeros(1)
     phases = np.ravel(end.coords[DRIVE_PHASE].values) if DRIVE_PHASE in end.coords else np.full(times.shape, np.nan)
     amid = ~(np.abs(phases - np.rint(phases)) < WHOLE) & (times != 0.0)

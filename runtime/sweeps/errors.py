@@ -1,4 +1,4 @@
-"""Errors of a sweep that does not come to its end."""
+"""Define the errors of a sweep that does not finish."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ from contextlib import contextmanager
 from ..results.result import Result
 
 ELSEWHERE = ("distributed", "dask", "tornado", "mpi4py")
-"""Packages whose errors mean that workers, or the connection to them, are lost."""
+"""An error from one of these packages means that workers, or the connection to workers, are lost."""
 
 
 class SweepInterrupted(KeyboardInterrupt):
-    """Ctrl-C during a sweep; `finished` of `cells` had finished, `result` holds them if no file does."""
+    """Ctrl-C during a sweep.
+
+    `finished` of `cells` cells had finished, and are in `result` unless a file stores them.
+    """
 
     def __init__(self, finished: int, cells: int, result: Result | None = None) -> None:
         super().__init__(f"interrupted with {finished} of {cells} cells finished")
@@ -28,7 +31,7 @@ class SweepInterrupted(KeyboardInterrupt):
 
 
 class SweepFailed(RuntimeError):
-    """A worker or the disk has failed; `finished` of `cells` had finished, `result` holds them if no file does."""
+    """A worker or the disk has failed; `finished` of `cells` cells had finished, and are in `result` or in a file."""
 
     def __init__(self, reason: str, finished: int, cells: int, result: Result | None = None) -> None:
         super().__init__(f"{reason}; {finished} of {cells} cells had finished")
@@ -41,7 +44,7 @@ def worker_lost(problem: BaseException) -> bool:
 
 
 def reason_of(problem: Exception) -> str | None:
-    """Return why workers are lost; None for any other error."""
+    """Return the reason of an error that means lost workers; None for any other error."""
     return f"the workers are lost ({problem})" if worker_lost(problem) else None
 
 
@@ -51,7 +54,7 @@ def sweep_errors(
     finished: Callable[[], tuple[int, Result | None]],
     reason: Callable[[Exception], str | None] = reason_of,
 ) -> Iterator[None]:
-    """Turn Ctrl-C into SweepInterrupted, and errors that have a reason into SweepFailed, with the cells that finished."""
+    """Convert Ctrl-C to SweepInterrupted, and errors with a `reason` to SweepFailed, both with the finished cells."""
     try:
         yield
     except KeyboardInterrupt:

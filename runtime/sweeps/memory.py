@@ -1,4 +1,4 @@
-"""The results of a sweep in memory: arrays of all its cells, which blocks fill."""
+"""Store the results of a sweep in memory, in arrays of all cells."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .scheduler import BlockScheduler
 
 @dataclass(slots=True)
 class Memory:
-    """Keeps the blocks of a sweep in arrays of all its cells."""
+    """Store the blocks of a sweep in arrays of all cells."""
 
     prepared: PreparedRun
     layout: Layout
@@ -32,7 +32,7 @@ class Memory:
 
     @classmethod
     def of(cls, prepared: PreparedRun, earlier: Result | None) -> Memory:
-        """Return arrays for all cells, with those of an earlier result that finished."""
+        """Return arrays for all cells; copy the finished cells of an earlier result."""
         reduction = prepared.reduction
         cells = reduction.scene.cells
         if earlier is None:
@@ -51,13 +51,16 @@ class Memory:
         return cls(prepared, prepared.layout(), reduction.merge.contract(network))
 
     def done(self) -> np.ndarray:
-        """Return True for each block (blocks,) that has finished with those before it; clear the others of a continued sweep."""
+        """Return whether each block (blocks,), and all blocks on which it depends, have finished.
+
+        In a continued sweep, clear the unfinished blocks.
+        """
         finished = self.buffers.finished
         done = np.zeros(self.layout.blocks, dtype=bool)
         for block in range(self.layout.blocks):
             rows, needed = self.layout.rows(block), self.layout.before(block)
             done[block] = finished[rows].all() and (needed is None or done[needed])
-            if self.layout.columns and not done[block]:  # its cells started from others
+            if self.layout.columns and not done[block]:  # the cells started from unfinished cells
                 self.buffers.clear(rows)
         return done
 
@@ -67,7 +70,7 @@ class Memory:
         return np.asarray(rows[~self.buffers.finished[rows]])
 
     def ends(self, block: int) -> Start:
-        """Return the final states of a block, and which of its cells finished."""
+        """Return the final states of a block, and whether each of its cells finished."""
         rows = self.layout.rows(block)
         return self.buffers.end[rows], self.buffers.finished[rows]
 
@@ -83,7 +86,7 @@ class Memory:
             with sweep_errors(reduction.scene.cells, lambda: (int(self.buffers.finished.sum()), self.result())):
                 reporter.start(tally(self.buffers.status[self.buffers.finished]), self.prepared.compiling)
                 scheduler.run()
-                # Rows are not kept; those of cells with short steps are laid out again.
+                # Rows are not stored: lay out the rows of cells with short steps again.
                 warn_of_steps(
                     ladder_of(reduction), self.buffers, lambda cells: reduction.rows(reduction.planner.rows(cells))
                 )
@@ -91,7 +94,7 @@ class Memory:
             reporter.close()
 
     def result(self) -> Result:
-        """Return the cells so far."""
+        """Return the result with the cells that have run so far."""
         prepared, scene = self.prepared, self.prepared.scene
         spans = prepared.reduction.planner.spans(np.arange(scene.cells))
         return gather(

@@ -1,4 +1,4 @@
-"""Merge the parts of a sweep, each run by a job of its own, into the result that one run would have written."""
+"""Merge the parts of a sweep, which separate jobs have run, into the result of the whole sweep."""
 
 from __future__ import annotations
 
@@ -91,8 +91,8 @@ class _PartFiles:
 
     paths: tuple[Path, ...]
     scene: Scene
-    counts: np.ndarray  # (CODES,): how many cells ended with each status
-    most: int  # section points of the cell that has most
+    counts: np.ndarray  # (CODES,): number of cells with each status
+    most: int  # largest number of section points of a cell
 
     @classmethod
     def read(cls, paths: list[Path]) -> _PartFiles:
@@ -131,7 +131,7 @@ class _PartFiles:
         return cls(tuple(ordered[k] for k in sorted(ordered)), scene, counts, most)
 
     def logs(self) -> Iterator[BlockLog]:
-        """Yield the logs in order, so that block 0 comes first; each is open until the next one is."""
+        """Yield the logs in order, beginning with that of block 0; a log is open until the next one is opened."""
         for path in self.paths:
             with closing(_finished(path, self.scene)) as log:
                 yield log
@@ -152,7 +152,7 @@ def _finished(path: Path, scene: Scene) -> BlockLog:
 
 
 def _text(about: Description) -> str:
-    """Return the description of a sweep without the number of its part, for comparison."""
+    """Return the description of a sweep as text for comparison, without the number of the part."""
     part = part_of(about)
     return json.dumps({**about, "part": part and part[1]}, sort_keys=True)
 

@@ -1,4 +1,4 @@
-"""Workers for the blocks of a job: threads of this process, or any `concurrent.futures.Executor`."""
+"""Run the blocks of a job on workers: threads of this process, or any `concurrent.futures.Executor`."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ class Task:
 
 
 Running = Future[Buffers | None]
-"""A task that was sent to a worker; its result is None if the worker has no job of that key yet."""
+"""A task that was sent to a worker; the result is None if the worker has not yet received the job."""
 
 Finish = Callable[[Task, Buffers], Task | None]
 """Store the results of a task; return the task that waited for it, or None."""
 
 
 class WorkerPool:
-    """Workers and their job; at most `limit` tasks, two for each worker, are sent at a time."""
+    """Workers and their job; at most `limit` tasks, two per worker, are in flight."""
 
     def __init__(self, job: Job, execution: Execution) -> None:
         self.job = job
@@ -58,9 +58,9 @@ class WorkerPool:
         self.close()
 
     def run(self, tasks: Iterator[Task], finish: Finish) -> None:
-        """Run the tasks and those that `finish` adds; raise the error of a worker.
+        """Run the tasks, and the tasks that `finish` returns; raise the error of a worker.
 
-        On Ctrl-C finish the blocks in flight first if that is possible; a second Ctrl-C abandons them.
+        On Ctrl-C, finish the blocks in flight first if possible; a second Ctrl-C abandons these blocks.
         """
         arrived: SimpleQueue[Running] = SimpleQueue()
         flying: dict[Running, Task] = {}
@@ -90,7 +90,7 @@ class WorkerPool:
             self.cancel()
             running = [future for future in flying if not future.cancel()]
             if isinstance(problem, KeyboardInterrupt):
-                # Keep the blocks that were running and still succeed.
+                # Store the running blocks that still succeed.
                 for future in running:
                     while not future.done():
                         with suppress(TimeoutError):
@@ -101,7 +101,7 @@ class WorkerPool:
             raise
 
     def submit(self, task: Task, introduce: bool = False) -> Running:
-        """Send a task to a worker; the first ones, and with `introduce`, with the specification of the job."""
+        """Send a task to a worker; add the specification of the job to the first tasks, and with `introduce`."""
         if self.shared:
             return self.executor.submit(self.job.run, *task.arguments)
         introduce = introduce or self.sent < self.limit
@@ -109,12 +109,12 @@ class WorkerPool:
         return self.executor.submit(run_block, self.key, self.spec if introduce else None, *task.arguments)
 
     def cancel(self) -> None:
-        """End what runs in this process."""
+        """End all cells that run in this process."""
         self.job.cancel()
         forget(self.key)
 
     def close(self) -> None:
-        """Shut the threads of the pool down; an executor of the caller stays open."""
+        """Shut down the threads of the pool; an executor of the caller stays open."""
         forget(self.key)
         if self.owned:
             self.executor.shutdown(wait=True, cancel_futures=True)

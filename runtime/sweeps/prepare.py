@@ -1,4 +1,4 @@
-"""From a reduced scene to a job that can run: write the text of its kernel, compile it or load it."""
+"""Prepare a reduced scene for running: write the text of its kernel, and compile or load the kernel."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from .continued_start import expect_whole_periods
 
 @dataclass(frozen=True, slots=True)
 class PreparedRun:
-    """A sweep with compiled kernel, ready to run."""
+    """A sweep with a compiled kernel, ready to run."""
 
     job: SweepJob
-    certificate: Certificate | None  # the exponents of all cells, if the run is certified
+    certificate: Certificate | None  # exponents of all cells of a certified run, else None
     execution: Execution  # runs the blocks
-    compiling: float  # seconds that the compilation of the kernel took, or its loading
+    compiling: float  # seconds for compiling or loading the kernel
 
     @property
     def reduction(self) -> ReducedScene:
@@ -44,7 +44,7 @@ class PreparedRun:
         return provenance(self.scene, job.kernel, self.reduction.skipped, spec.versions, spec.processor)
 
     def layout(self, workers: int | None = None) -> Layout:
-        """Return the blocks of the sweep, of a size that suits so many workers (default: those of the execution)."""
+        """Return the blocks of the sweep, sized for a number of workers (default: that of the execution)."""
         workers = self.execution.size if workers is None else workers
         return Layout.of(self.scene, block_size(self.scene, self.job.spec.width, workers))
 

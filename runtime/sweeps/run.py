@@ -2,14 +2,17 @@
 
 The stages of `run`; the output of each is the input of the next.
 
-1. *Scene*: ``Given.sweep`` (cells/run_keywords), Scene → Scene.  Fix or sweep parameters and initial states, add draws, take the
+1. *Scene*: ``Given.sweep`` (cells/run_keywords), Scene → Scene.  Fix or sweep parameters and initial states, add draws,
+take the
    states of an earlier run as the start.
-2. *Reduction*: ``as_reduction`` (cells/reduce), Scene → ReducedScene.  Leave out terms that vanish in every cell and merge
+2. *Reduction*: ``as_reduction`` (cells/reduce), Scene → ReducedScene.  Leave out terms that vanish in every cell and
+merge
    oscillators that move as one, exactly.  Its planner lays out cells as rows of numbers.
 3. *Kernel*: ``prepare`` (sweeps/prepare), ReducedScene → PreparedRun.  Choose the integrator by the rates of some cells
    (engines/choice), write the text of the kernel (codegen/kernels), compile it or load it (codegen/machine_code).
-4. *Certificate*, if asked for: ``certified`` (sweeps/certify), PreparedRun → PreparedRun with transversal exponents.
-5. *Blocks*: ``Memory.run`` (sweeps/memory), PreparedRun → Buffers.  The scheduler gives blocks of cells to workers; the planner
+4. *Certificate*, optional: ``certified`` (sweeps/certify), PreparedRun → PreparedRun with transversal exponents.
+5. *Blocks*: ``Memory.run`` (sweeps/memory), PreparedRun → Buffers.  The scheduler gives blocks of cells to workers; the
+planner
    makes rows of each block, and an `Engine` (engines/engine) integrates the rows into buffers.
 6. *Result*: ``Memory.result``, Buffers → Result.  Expand to the whole network and label (results/labels).
 
@@ -65,11 +68,11 @@ def run(
     start : Result, DataArray, mapping, or sequence of numbers, optional
         Start from the states at the end of one cell: a result of one cell, or
         `result.end.isel(sigma=-1)`; or from a table as `initial` of `Scene` takes, or all states in
-        the order of the equations.  A result of several cells starts each cell from the cell with
-        the same values of the axes; an axis that the result lacks starts all its values from one
-        cell.  Components and nodes must be those of the scene.  Time counts from 0 again, so the
-        drive must have been at the beginning of a period; the attribute `start_time` of the data,
-        a coordinate if there were several cells, is that time of the earlier run.
+        the order of the equations.  If the result has several cells, each cell starts from the cell
+        with the same values of the axes; if the result lacks an axis, all values of this axis start
+        from one cell.  Components and nodes must be those of the scene.  Time starts from 0 again, so
+        that the earlier run must end with a period of the drive.  The attribute `start_time` of the
+        data, a coordinate for several cells, is the time at which the earlier run ended.
     width : int, optional
         Number of lanes: 1, 2, 4, 8 or 16 (default: what the processor has, one for a single cell).
     reduce : bool or ReducedScene
@@ -79,11 +82,11 @@ def run(
         Add the transversal exponent of every cell and a verdict on its synchronisation, and end
         cells early that are certain to stay synchronous (see `synchain.runtime.sweeps.certify`).
     realisations, draws, rng : optional
-        As for `Scene`: a further dimension of the sweep (docs/observing.md).
+        As for `Scene`; they add a dimension to the sweep (docs/observing.md).
     workers : int, optional
         Number of threads (default: all cores).
     executor : concurrent.futures.Executor, optional
-        Runs the blocks in place of threads (docs/scale.md).
+        Executor that runs the blocks, instead of threads (docs/scale.md).
     show_progress : bool, optional
         Whether to show a bar; by default a bar on terminals and in notebooks, a line a minute elsewhere.
     progress : callable, optional
@@ -123,7 +126,7 @@ def run(
     >>> print(result.end.values.ravel().round(6))
     [0.735759 0.270671]
     """
-    # 1. Scene: one state to start from is the start of the scene, which axes of initial states then replace.
+    # 1. Scene: a start of one cell becomes the initial state of the scene; axes of initial states replace it.
     start_times: float | np.ndarray | None = None
     starts = None
     if start is not None and not several(start):

@@ -1,4 +1,4 @@
-"""Schedule the unfinished blocks of a sweep: which can run, and where they go when they have ended."""
+"""Schedule the unfinished blocks of a sweep: choose blocks that can run, and store finished blocks."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from .prepare import PreparedRun
 
 
 class Sink(Protocol):
-    """Store blocks that have ended: in memory, on disk, or their ends alone."""
+    """Store blocks that have ended: in memory, on disk, or only their final states."""
 
     layout: Layout
 
     def missing(self, block: int) -> np.ndarray:
-        """Return the numbers of the cells of a block that are still to run; all of them, unless single cells are stored."""
+        """Return the numbers of the unfinished cells of a block; all cells, if the sink stores only complete blocks."""
         return self.layout.rows(block)
 
     def ends(self, block: int) -> Start:
-        """Return the final states of a stored block, and which of its cells finished."""
+        """Return the final states of a stored block, and whether each of its cells finished."""
 
     def put(self, task: Task, buffers: Buffers) -> None:
-        """Store the cells of a block; cells that Ctrl-C cut short may be among them."""
+        """Store the cells of a block; Ctrl-C may have interrupted some of the cells."""
 
 
 @dataclass(slots=True)
@@ -43,22 +43,22 @@ class BlockScheduler:
     reporter: Reporter
 
     def run(self) -> None:
-        """Run all blocks that the sink lacks; raise the errors of workers, and KeyboardInterrupt on Ctrl-C."""
+        """Run all unfinished blocks; raise the errors of workers, and KeyboardInterrupt on Ctrl-C."""
         if self.done.all():
             return
         with WorkerPool(self.prepared.job, self.prepared.execution) as pool:
             pool.run(self.tasks(), self.finish)
 
     def tasks(self) -> Iterator[Task]:
-        """Yield the unfinished blocks that depend on no unfinished one."""
-        done = self.done.copy()  # `finish` returns the block that depends on one that finishes meanwhile
+        """Yield the unfinished blocks that do not depend on an unfinished block."""
+        done = self.done.copy()  # for a block that finishes meanwhile, `finish` returns the dependent block
         for block in np.flatnonzero(~done).tolist():
             needed = self.sink.layout.before(block)
             if needed is None or done[needed]:
                 yield self._task(block, None if needed is None else self.sink.ends(needed))
 
     def finish(self, task: Task, buffers: Buffers) -> Task | None:
-        """Store a block; return the one that depends on it, or None."""
+        """Store a block; return the block that depends on it, or None."""
         self.sink.put(task, buffers)
         if not buffers.ended:
             return None

@@ -1,6 +1,6 @@
-"""Run a scene to a file: blocks go to disk as they end, so that a crash loses at most the blocks being computed.
+"""Run a scene to a file: each block is written as soon as it ends, so that a crash loses only the running blocks.
 
-The stages are those of `run.py`; `claim` decides before them whether a file is begun, continued or complete.
+The stages are those of `run.py`. Before them, `claim` decides whether to begin or to continue a file, or to return.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ from .prepare import PreparedRun, prepare
 from .scheduler import BlockScheduler, Sink
 
 JOB_THREADS = 8
-"""Threads that a job of a job array is expected to have (a choice); its part is cut into blocks for so many."""
+"""Expected number of threads of a job in a job array (a choice); a part is divided into blocks for this number."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Streamed(Labelled):
-    """A finished run: its file, how its cells ended, and how many have each verdict (certified runs only)."""
+    """A finished run: file, number of cells with each status and, for certified runs, with each verdict."""
 
     path: Path
     scene: Scene
@@ -75,10 +75,10 @@ class Streamed(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """Scene, file, time, how cells ended, verdicts."""
+        """Scene, file, time, statuses of cells, verdicts."""
         done, scene = self.progress, self.scene
         times = f" in {done.running:.1f} s, after {done.compiling:.1f} s for the kernel"
-        if done.total and done.kept == done.total:  # a result that was there, or merged parts
+        if done.total and done.kept == done.total:  # an existing result, or merged parts
             times = ", run earlier"
         elif done.kept:
             times += f", {done.kept} of them in an earlier run"
@@ -188,7 +188,7 @@ def stream(
     else:
         prepared = prepare(reduction, execution, width=width)
         prepared = with_certificate(prepared) if certified else prepared
-        # All parts must divide the sweep alike, however many threads each job has.
+        # All parts must use the same blocks, for any number of threads of a job.
         layout = prepared.layout(None if part is None else JOB_THREADS * part[1])
         about = describe_sweep(reduction, layout, prepared.attributes, prepared.certificate, part)
         try:
@@ -218,7 +218,7 @@ def claim(
     certified: bool = False,
     part: tuple[int, int] | None = None,
 ) -> str:
-    """Return what to do about a result at `path`: "begin", "continue", or nothing because it is "complete"."""
+    """Return the next action for a result at `path`: "begin", "continue", or "complete" if the result is finished."""
     check_part(part)
     for name, value in (("resume", resume), ("overwrite", overwrite), ("certified", certified)):
         check_flag(name, value)
