@@ -1,1 +1,1 @@
-"""Equilibria of networks, periodic orbits, their branches and bifurcations: may know stability and runs."""
+"""Find equilibria of networks, periodic orbits, branches and bifurcations. Modules here use stability and runs."""

@@ -1,8 +1,9 @@
-"""Bifurcations of periodic orbits between two neighbours on a branch, and at its end.
+"""Locate bifurcations of periodic orbits between two neighbouring orbits of a branch, and at the end of a branch.
 
-A test function of the orbit changes its sign at each kind, and its zero is found along the branch.  M is the monodromy matrix.
+Each kind of bifurcation is a zero of a test function of the orbit, at which the function changes its sign. M is the
+monodromy matrix.
 
-| kind | test function | beside it |
+| kind | test function | further condition |
 |---|---|---|
 | period doubling | modulus - 1 of the k-th multiplier, sorted by size | the multiplier is -1 |
 | fold | the same | the multiplier is 1, and the branch turns back in its parameter |
@@ -11,14 +12,15 @@ A test function of the orbit changes its sign at each kind, and its zero is foun
 | stick loss | the load at a landing, less the limit of static friction | only stick phases come or go |
 | grazing | the gap that closes inside a phase | phases come or go |
 
-Moduli sorted by size are continuous along a branch, and a saddle with multipliers of the product 1 makes no sign change.
-Multipliers that change places in one step are found by the signs of det(M + I) and det(M - I).  Grazing can be approached only
-from the side of fewer phases, where the closing gap is defined: each orbit on the way has a sixteenth of the gap of the one
-before, and Newton's method starts from a polynomial through those, so that it does not leave this side.
+Moduli sorted by size are continuous along a branch, and do not change sign at a saddle whose multipliers have the
+product 1. If two multipliers change places in one step, the signs of det(M + I) and det(M - I) show the crossing. A
+graze can be approached only from the side of fewer phases, where the closing gap is defined. Each orbit on the way has
+a sixteenth of the gap of the orbit before. Newton's method starts from a polynomial through these orbits, so that it
+stays on this side.
 
 Sources: Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed. (Springer, 2004), chapter 10; Seydel, Practical
-Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapters 5 and 7; di Bernardo, Budd, Champneys & Kowalczyk,
-Piecewise-smooth Dynamical Systems (Springer, 2008), chapters 7-8.
+Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapters 5 and 7; di Bernardo, Budd, Champneys &
+Kowalczyk, Piecewise-smooth Dynamical Systems (Springer, 2008), chapters 7-8.
 """
 
 from __future__ import annotations
@@ -41,10 +43,11 @@ Test = Callable[[PeriodicOrbit], float]
 """A test function of the orbit, zero at a bifurcation."""
 
 LOCATED = 1e-6
-"""Largest residual of a bifurcation (a choice); a larger one shows that a test function jumps, as between two branches."""
+"""Largest residual of a bifurcation (a choice); a larger residual means that the test function jumps between
+branches."""
 
 SHUT = 1e-13
-"""Gap as small as the error of the integration, which cannot be closed further."""
+"""A gap of this size is an error of the integration, and cannot be closed further."""
 
 SHARE = 1.0 / 16.0
 """Part of the gap that remains after each step towards a graze (a choice)."""
@@ -56,10 +59,11 @@ LEAST_REACH = 1e-4
 """Shortest step towards a graze, relative to the distance to the other end (a choice)."""
 
 NEUTRAL = 1e-9
-"""Distance from the unit circle that may be a rounding error, as all are of orbits without damping (a choice)."""
+"""A multiplier within this distance of the unit circle may be on the circle, like all multipliers without damping (a
+choice)."""
 
 BESIDE = 1e-2
-"""Distance from a crossing, relative to the step, at which such a multiplier must have left the circle (a choice)."""
+"""Such a multiplier must have left the circle at this distance from a crossing, relative to the step (a choice)."""
 
 REAL = 1e-6
 """Largest imaginary part of a multiplier that passes the circle at -1 or 1 (a choice)."""
@@ -71,8 +75,8 @@ class Bifurcation:
 
     value: float  # value of the parameter
     kind: BifurcationKind
-    # how far `orbit` is from the bifurcation: the distance of its multiplier from -1, from 1 or, for Neimark-Sacker,
-    # from the unit circle; the gap in grazing; the excess of the load in stick loss. `follow` accepts 1e-6 at most
+    # distance of `orbit` from the bifurcation: of the multiplier from -1, from 1 or, for Neimark-Sacker, from the unit
+    # circle; for grazing the gap; for stick loss the excess of the load. `follow` accepts at most 1e-6
     residual: float
     orbit: PeriodicOrbit = field(repr=False)  # nearest orbit to the bifurcation
 
@@ -128,7 +132,7 @@ def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
     if arc.periods % 2:
         return None
     try:
-        # The orbit of half the periods lies between the halves of the last orbit.
+        # Start the search for the orbit of half the periods from the mean of both halves of the last orbit.
         middle = 0.5 * (last.state + strobe(last.scene, last.state, half)[0])
         single = Arc(arc.scene, arc.name, half)
         for value in (arc.values[-1], beyond):
@@ -199,7 +203,9 @@ def _crossings(step: OrbitPair) -> list[Bifurcation]:
             kind = BifurcationKind.NEIMARK_SACKER
             next(passing, None)  # the other multiplier of the pair
         crossings.append(Bifurcation(value, kind, _residual(orbit, kind), orbit))
-    # A determinant that changes its sign demands an odd number of crossings: one is left where multipliers change places.
+    # If a determinant changes its sign, the number of crossings is odd: find the one that moduli miss, where
+    # multipliers
+    # change places.
     for point, kind in kinds.items():
         test = partial(det, point=point)
         if step.changes(test) and sum(each.kind is kind for each in crossings) % 2 == 0:
@@ -217,7 +223,10 @@ def _residual(orbit: PeriodicOrbit, kind: BifurcationKind) -> float:
 
 
 def _root(test: Callable[[float], float], arc: Arc, ends: tuple[float, float]) -> tuple[float, PeriodicOrbit]:
-    """Return the zero of a test function and the orbit there; the end nearer to zero if Newton's method loses the orbit."""
+    """Return the zero of a test function and the orbit there.
+
+    The end nearer to zero if Newton's method loses the orbit.
+    """
     try:
         value = float(brentq(test, *ends, xtol=1e-14 * max(map(abs, ends)), rtol=1e-14))
         return value, arc.at(value)
@@ -266,7 +275,7 @@ def _graze(arc: Arc, beyond: float) -> Bifurcation:
         low, gap = arc.values[-1], _last_phases(arc).gap
         if gap < SHUT or abs(beyond - low) <= 1e-15 * abs(low) or reach < LEAST_REACH:
             break
-        # The next value: where the gap should be a share of its last one, or else a part of the way to `beyond`.
+        # Choose the next value: where the extrapolated gap is `share` times the last one, or else nearer to `beyond`.
         value = _value_at_gap(arc, share * gap)
         guided = share < 0.99 and min(low, beyond) < value < max(low, beyond)
         value = value if guided else low + reach * (beyond - low)

@@ -1,12 +1,12 @@
-"""Branches of periodic orbits along a parameter, and the bifurcations on them.
+"""Follow branches of periodic orbits along a parameter, and locate the bifurcations on each branch.
 
-A smooth bifurcation is a multiplier that passes the unit circle: at -1, at 1, or in a complex pair.  A bifurcation of friction
-is a change of the phases of stick and slip.  In grazing, a phase begins in the middle of another one, as its distance from
-it becomes zero.  In stick loss, a body that landed in stick turns at once, as the load at the landing passes the limit of
-static friction.  `synchain.runtime.bifurcation.bifurcations` locates them.
+A smooth bifurcation is a multiplier that passes the unit circle: at -1, at 1, or in a complex pair.  A bifurcation of
+friction is a change of the phases of stick and slip.  In grazing, a phase begins in the middle of another phase, where
+a margin becomes zero.  In stick loss, a body that landed in stick turns at once, as the load at the landing passes the
+limit of static friction.  `synchain.runtime.bifurcation.bifurcations` locates them.
 
-The tracer doubles its step after each orbit.  It halves the step if no orbit fits the arc, if a bifurcation on it is not
-located, or if phases change on it and it is long.  Where steps are refused, it looks for a bifurcation that ends the branch.
+The tracer doubles its step after each orbit. It halves a step if no orbit fits the arc, if a bifurcation on the step is
+not located, or if phases change on a long step. After refused steps, it looks for a bifurcation that ends the branch.
 
 Sources: as `synchain.runtime.bifurcation.continuation`; di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth
 Dynamical Systems (Springer, 2008), chapters 7-8, for friction.
@@ -41,19 +41,23 @@ LONGEST = 1.0 / 4.0
 """Longest step, relative to the range of the parameter (a choice)."""
 
 SHORT = 1.0 / 32.0
-"""Length of a refused step, relative to the range or to the last such step, at which the branch's end is sought (a choice)."""
+"""Length of a refused step, relative to the range or to the last such step, at which the branch's end is sought (a
+choice)."""
 
 SHORTEST = 2.0**-20
 """Shortest step, relative to the range; if it is refused too, the branch is lost (a choice)."""
 
 APART = 1.0 / 64.0
-"""Longest step, relative to the range, in which a change of phases is located; two changes in one count as one (a choice)."""
+"""Longest step, relative to the range, in which a change of phases is located; two changes in one count as one (a
+choice)."""
 
 FAR = 0.3
-"""Largest distance from the expected state, relative to the step, of an orbit of other phases on the same branch (a choice)."""
+"""Largest distance from the expected state, relative to the step, of an orbit of other phases on the same branch (a
+choice)."""
 
 KINK = 1e-2
-"""Distance from the expected state that such an orbit may always have, relative to its extent: a change of phases is a kink of
+"""Distance from the expected state that such an orbit may always have, relative to its extent: a change of phases is a
+kink of
 the branch (a choice)."""
 
 NAMES = frozenset(
@@ -148,8 +152,9 @@ def follow(
 ) -> Branch:
     """Follow a periodic orbit along a parameter and locate its bifurcations.
 
-    The branch alone determines the steps; `values` select the orbits that are returned. A step is halved if the orbit does
-    not fit the tangents of the branch, if a multiplier moves far, or if a bifurcation on it has a residual above 1e-6.
+    The branch alone determines the steps; `values` select the orbits that are returned. A step is halved if the orbit
+    does not fit the tangents of the branch, if a multiplier moves far, or if a bifurcation on it has a residual above
+    1e-6.
 
     Parameters
     ----------

@@ -1,17 +1,20 @@
-"""Continuation of periodic orbits along a smooth arc of their branch, and through a fold.
+"""Continue periodic orbits along a smooth arc of their branch, and through a fold.
 
 1. An arc.  All its orbits have the same phases of stick and slip.  Newton's method starts from a polynomial through the
    nearest orbits of the arc, so that it stays on the arc where the branch has a kink, as at a change of phases.
 2. Tangents.  An orbit x(p) of the map P(x, p) has dx/dp = (I - M)^-1 P_p.  A step is accepted if its chord fits the
    tangents at both ends, and if no multiplier moves far.
-3. Folds.  There the branch turns back in p and a multiplier is 1, so that I - M is singular.  Pseudo-arclength continuation
-   (Keller) passes through: x and p are unknowns together, and the length along a direction t is prescribed, with the matrix
+3. Folds.  There the branch turns back in p and a multiplier is 1, so that I - M is singular.  Pseudo-arclength
+continuation
+   (Keller) passes through: x and p are unknowns together, and the length along a direction t is prescribed, with the
+   matrix
 
        B = [M - I, P_p; t'].
 
-4. Folds against branch points.  det(M - I)/det B is the parameter's share of the tangent.  At a fold det(M - I) alone
-   changes its sign.  At a branch point both do if the arc goes straight on, and det B alone if it turns there, as one that
-   is born in a pitchfork does.
+4. Folds and branch points.  det(M - I)/det B is the parameter's share of the tangent.  At a fold only det(M - I)
+changes
+   its sign.  At a branch point both determinants change sign if the arc goes straight on.  If the arc turns there, as
+   an arc that is born in a pitchfork does, only det B changes its sign.
 
 Sources: Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems, in Rabinowitz
 (ed.), Applications of Bifurcation Theory (Academic Press, 1977), pages 359-384; Seydel, Practical
@@ -38,7 +41,7 @@ NEAR = 3
 """Number of orbits that the polynomial of a first guess passes through (a choice)."""
 
 FIT = 0.5
-"""Largest part of the change of the state on a step that its derivative at either end leaves unexplained (a choice)."""
+"""Largest difference between the chord of a step and the tangent at either end, relative to the chord (a choice)."""
 
 MOVE = 0.75
 """Largest distance that a multiplier moves in a step, relative to its modulus if that exceeds 1 (a choice)."""
@@ -59,8 +62,9 @@ NEUTRAL = 1e-6
 """Largest distance from 1 of the multiplier at a branch point; a kink has none so near (a choice)."""
 
 DIFFERENCE, SHARE = 1e-6, 1e-3
-"""Half width of the central difference for P_p: this part of the parameter, or of its way along the arc if that is more.
-With rtol = 1e-12 the quotient has some six digits, which Newton's method does not need more of (choices)."""
+"""Half width of the central difference for P_p: DIFFERENCE times the parameter or, if that is more, SHARE times its way
+along
+the arc.  With rtol = 1e-12 the quotient has some six digits, enough for Newton's method (choices)."""
 
 CLOSED = 1e-11
 """Largest distance of a point of an arc from its image, relative to the extent of each component (a choice)."""
@@ -138,8 +142,10 @@ class Arc:
             return False
         way, change = value - self.values[-1], orbit.state - last.state
         allowed = FIT * relative(change, orbit.extent) + SAME
-        # An orbit of another branch does not fit the tangent at the last orbit, or the chord does not fit its tangent. Under
-        # set-valued friction the state has a kink where the start of the period passes from stick to slip: only the tangent
+        # An orbit of another branch does not fit the tangent at the last orbit, or the chord does not fit its tangent.
+        # Under
+        # set-valued friction the state has a kink where the start of the period passes from stick to slip: only the
+        # tangent
         # at the end fits.
         ends = [(value, orbit), (self.values[-1], last)]
         for at, end in ends if self.phases[-1] is None else ends[:1]:

@@ -1,20 +1,22 @@
-"""Equilibria of undriven networks: states at rest, and rigid rotations, at rest in a frame that moves with them.
+"""Find equilibria of undriven networks: states at rest, and rigid rotations, which are at rest in a moving frame.
 
-The equations are M(x) dx/dt = r(x), and r(x) = 0 is solved by Newton's method with the exact sparse Jacobian J = dr/dx.  The
-eigenvalues of M^-1 J decide stability: at rest the derivative of M is multiplied by rates that are zero.
+The equations are M(x) dx/dt = r(x), and r(x) = 0 is solved by Newton's method with the exact sparse Jacobian J = dr/dx.
+The eigenvalues of M^-1 J decide stability: at rest the derivative of M is multiplied by rates that are zero.
 
 1. Shifts.  If a coordinate of all nodes can be shifted together (phases of oscillators, rotor angles of a power grid),
-   equilibria are not isolated.  With e = (1 … 1) along the coordinate, the common speed s is unknown too, and the step is
-   normal to the shift: J dx - e ds = -(r - e s), e' dx = 0.  A speed other than zero is a rigid rotation.
-2. Singular Jacobians.  A conserved momentum makes a line of equilibria as well, free masses at any common speed: the step of
+   equilibria are not isolated.  With e = (1 … 1) along the coordinate, the common speed s is unknown too, and the step
+   is normal to the shift: J dx - e ds = -(r - e s), e' dx = 0.  A speed other than zero is a rigid rotation.
+2. Singular Jacobians.  A conserved momentum makes a line of equilibria as well, free masses at any common speed: the
+step of
    least squares and least norm leads to one of them near the start.
 3. Damping.  A step is halved until the weighted norm of the rates falls (Deuflhard, section 3.3).
-4. Pseudo-transient continuation.  Where Newton's method fails, implicit Euler steps (M/h - J) dx = r follow the motion from
+4. Pseudo-transient continuation.  Where Newton's method fails, implicit Euler steps (M/h - J) dx = r follow the motion
+from
    the start; h grows as the rates fall, and Newton's method goes on from there (Kelley & Keyes).
 5. Rounding.  A rate counts as zero relative to the sizes of its terms, and a tail of rates that has no root is refused.
 
-Sources: Kelley & Keyes, SIAM J. Numer. Anal. 35, 508 (1998); Seydel, Practical Bifurcation and Stability Analysis, 3rd ed.
-(Springer, 2010), section 1.2; Deuflhard, Newton Methods for Nonlinear Problems (Springer, 2004), section 3.3.
+Sources: Kelley & Keyes, SIAM J. Numer. Anal. 35, 508 (1998); Seydel, Practical Bifurcation and Stability Analysis, 3rd
+ed. (Springer, 2010), section 1.2; Deuflhard, Newton Methods for Nonlinear Problems (Springer, 2004), section 3.3.
 """
 
 from __future__ import annotations
@@ -40,7 +42,8 @@ from ..sweeps.continued_start import StartValue, started
 from .linearised import Linearised
 
 MOST_STEPS, HALVINGS = 100, 40
-"""Most steps of Newton's method, and most halvings of one until the residual falls: 2^-40 of a step is rounding (choices)."""
+"""Most steps of Newton's method, and most halvings of one until the residual falls: 2^-40 of a step is rounding
+(choices)."""
 
 CLOSED = 1e-11
 """Largest rate at an equilibrium, relative to the sizes of its terms: 45 000 rounding errors (a choice)."""
@@ -48,20 +51,23 @@ CLOSED = 1e-11
 TAIL = 0.34
 """Largest factor by which the last step of Newton's method may lower the rates at a root.
 
-At a root of multiplicity m a step leaves (1 - 1/m)^m of the rates: 0 of a simple root, 1/4 at a fold.  Along a tail x^-p, which
-has no root, it leaves (1 + 1/p)^-p, more than 1/e = 0.37.  0.34 admits roots of a multiplicity up to 7.
+At a root of multiplicity m a step leaves (1 - 1/m)^m of the rates: 0 of a simple root, 1/4 at a fold.  Along a tail
+x^-p, which has no root, it leaves (1 + 1/p)^-p, more than 1/e = 0.37.  0.34 admits roots of a multiplicity up to 7.
 """
 
 MOST_RELAXED, FIRST_RATE = 500, 10.0
 """Most implicit Euler steps, and 1/h of the first in units of the largest slope of a rate (choices)."""
 
 WORSE, NEWTON = 1.5, 1e-6
-"""An Euler step by which the rates grow more than WORSE times is repeated with h/4; Newton's method takes over where they have
+"""An Euler step by which the rates grow more than WORSE times is repeated with h/4; Newton's method takes over where
+they have
 fallen to NEWTON of the sizes of their terms (choices)."""
 
 SINGULAR, DAMPED = 1e-13, 1e-7
-"""A scaled matrix whose least pivot is below SINGULAR of the largest counts as singular: some hundred rounding errors.  It is
-solved with the damping DAMPED, whose square, which is what acts on regular directions, is near rounding (choices)."""
+"""A scaled matrix counts as singular if its least pivot is below SINGULAR, some hundred rounding errors, of the
+largest. It
+is solved with the damping DAMPED. Regular directions change by DAMPED squared only, which is near rounding
+(choices)."""
 
 DENSE = 2000
 """Most states of which all eigenvalues are computed: their dense matrix has 32 MB (a choice)."""
@@ -70,23 +76,26 @@ FEW = 12
 """Number of eigenvalues of larger networks, unless `count` is given (a choice)."""
 
 ASIDE = 1e-6
-"""Place around which few eigenvalues are computed, relative to the largest entry of J: 0 itself is an eigenvalue of each shift."""
+"""Few eigenvalues are computed around this point, in units of the largest entry of J; 0 is an eigenvalue of each
+shift."""
 
 EVEN = 1e-15
 """Speed of a shift that is rounding, relative to the largest size of a rate's terms."""
 
 ZERO = 1e-7
-"""Size of an eigenvalue that counts as zero, relative to the largest: at a fold two solutions merge, and a rounding error of
+"""Size of an eigenvalue that counts as zero, relative to the largest: at a fold two solutions merge, and a rounding
+error of
 1e-16 moves the eigenvalue by its square root."""
 
 LEAST = 1e-12
 """Size of an eigenvalue that is a rounding error, relative to the fastest rate (a choice)."""
 
 BESIDE = 0.1
-"""Relative distance at which slopes are measured beside a state: at a fold those at the state itself may vanish (a choice)."""
+"""Relative distance at which slopes are measured beside a state: at a fold those at the state itself may vanish (a
+choice)."""
 
 SHIFTS = (7e-13, 7e-9, 7e-5, 0.7, 7e3, 7e7, 7e11)
-"""Distances by which a shift is tried: some of them are neither tiny nor huge, whatever the unit of the state."""
+"""Distances by which a shift is tried: for any unit of the state, some of them are neither tiny nor huge."""
 
 REFUSED = {
     "rtol": "Newton's method ends at rounding",
@@ -108,10 +117,11 @@ class Equilibrium(Labelled):
     state : ndarray, shape (states,)
         The state in the order of the equations: x_1 … x_n, v_1 … v_n.
     eigenvalues : ndarray of complex, shape (k,)
-        Eigenvalues of the linearised network per unit of non-dimensional time, the largest real part first: all, or those
-        nearest to zero.
+        Eigenvalues of the linearised network per unit of non-dimensional time, the largest real part first: all, or
+        those nearest to zero.
     shifts : tuple of str
-        Coordinates that can be shifted at all nodes together without any change of the rates. Each makes one eigenvalue zero.
+        Coordinates that can be shifted at all nodes together without any change of the rates. Each makes one eigenvalue
+        zero.
     speeds : ndarray, shape (shifts,)
         Common rates of these coordinates; 0 at rest.
     residual : float
@@ -186,7 +196,7 @@ class Equilibrium(Labelled):
 
     @property
     def verdict(self) -> str:
-        """The stability as a phrase: stable, unstable with the number of growing eigenvalues, neutral, or not decided."""
+        """Stability as text: stable, unstable with the number of growing eigenvalues, neutral, or not decided."""
         if self.growing:
             return f"unstable, {'' if self.complete else 'at least '}{self.growing} growing"
         if not self.complete:
@@ -214,7 +224,7 @@ def equilibrium(
 ) -> Equilibrium:
     """Find an equilibrium of a network without a drive by Newton's method, and its stability.
 
-    If that fails, steps along the motion lead closer to the rest that it comes to, if it does.
+    If Newton's method fails, steps along the motion lead closer to a state of rest, if the motion comes to rest.
 
     Parameters
     ----------
@@ -239,8 +249,8 @@ def equilibrium(
     Raises
     ------
     ValueError
-        If time enters the equations, but for a drive of strength 0, for set-valued friction and rates that jump, if a parameter is
-        unknown, or if `start` holds no states of this network.
+        If time enters the equations (except in a drive of strength 0), if friction is set-valued, if rates jump, if a
+        parameter is unknown, or if `start` contains no states of this network.
     ArithmeticError
         If Newton's method does not converge, or the eigenvalues of a large network do not.
 
@@ -344,7 +354,7 @@ def _shifts(scene: Scene, network: Linearised, state: np.ndarray) -> tuple[tuple
 
 @dataclass(slots=True)
 class Search:
-    """A state on its way to rest, with the rates that are left: r(x) - shifts @ speeds."""
+    """A state during the search; the remaining rates are r(x) - shifts @ speeds."""
 
     network: Linearised
     shifts: np.ndarray  # (states, shifts): vectors of ones
@@ -369,15 +379,15 @@ class Search:
         return cls(network, shifts, state, speeds, scales)
 
     def left(self, state: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-        """Return the rates that are left at a state with some speeds."""
+        """Return the remaining rates at a state with these speeds."""
         return np.asarray(self.network.rates(state) - self.shifts @ speeds)
 
     def size(self, gap: np.ndarray) -> float:
-        """Return the weighted norm of rates that are left."""
+        """Return the weighted norm of remaining rates."""
         return float(np.linalg.norm(gap / self.scales))
 
     def limits(self, state: np.ndarray) -> np.ndarray:
-        """Return the rates (states,) that may be left at an equilibrium."""
+        """Return the largest remaining rates (states,) at an equilibrium."""
         return np.asarray(CLOSED * (self.network.term_sizes(state) + np.abs(self.shifts @ self.speeds)))
 
     def correction(self, gap: np.ndarray, rate: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -416,12 +426,13 @@ class Search:
     def _is_at_root(self, gaps: np.ndarray, limits: np.ndarray) -> bool:
         """Return whether Newton's method ended at a root; states that vanish to rounding become zero.
 
-        gaps, limits (steps, states): the rates that were left after each step, and those that may be left.
+        gaps, limits (steps, states): the remaining rates after each step, and the largest remaining rates allowed.
         """
         limit = limits[-1]
         closed = gaps[-1] <= limit
         if not closed.all():
-            # The terms of a rate such as x' = v all vanish with v, so that it is never small beside them.  A state whose
+            # The terms of a rate such as x' = v all vanish with v, so that it is never small beside them.  A state
+            # whose
             # size changes no closed rate by more than its limit is rounding: set it to zero and look again.
             change = abs(_jacobian(self.network, self.state)) @ sparse.diags_array(np.abs(self.state)).tocsc()
             unnoticed = np.asarray((change[closed] > limit[closed][:, None]).sum(axis=0)).ravel() == 0
@@ -429,7 +440,8 @@ class Search:
             if not np.all(np.abs(self.left(rounded, self.speeds)) <= self.limits(rounded)):
                 return False
             self.state = rounded
-        # Refuse a tail of the rates that has no root: there the step that closes them lowers them by less than e (TAIL).
+        # Refuse a tail of the rates that has no root: there the step that closes them lowers them by less than e
+        # (TAIL).
         last = int(np.argmax(np.all((gaps <= limits)[:, closed], axis=1)))
         levels = (gaps / np.where(limit > 0.0, limit, np.inf))[:, closed].max(axis=1, initial=0.0)
         return last == 0 or bool(levels[last] <= TAIL * levels[last - 1])

@@ -1,12 +1,12 @@
-"""Periodic orbits by Newton's method.
+"""Find periodic orbits by Newton's method.
 
-A drive of period T makes the stroboscopic map P: x(0) -> x(kT) over k of its periods.  An orbit of k periods is a fixed point,
-found by x <- x + (I - M)^-1 (P(x) - x).  The derivative M of P is the monodromy matrix: the propagator of a deviation along
-the orbit (`synchain.runtime.stability.orbits`), through stick and slip if friction is set-valued, so that the method
-converges quadratically for both forms of the law.  The eigenvalues of M are the Floquet multipliers.
+A drive of period T makes the stroboscopic map P: x(0) -> x(kT) over k of its periods.  An orbit of k periods is a fixed
+point, found by x <- x + (I - M)^-1 (P(x) - x).  The derivative M of P is the monodromy matrix: the propagator of a
+deviation along the orbit (`synchain.runtime.stability.orbits`), through stick and slip if friction is set-valued, so
+that the method converges quadratically for both forms of the law.  The eigenvalues of M are the Floquet multipliers.
 
-The cycle of an undriven oscillator is followed to its attractor first; `synchain.runtime.stability.limit_cycle` then solves
-for a state and the period together.
+The cycle of an undriven oscillator is followed to its attractor first; `synchain.runtime.stability.limit_cycle` then
+solves for a state and the period together.
 
 Sources: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapter 7;
 for orbits with stick, Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems
@@ -58,10 +58,12 @@ CLOSED = 1e-9
 """Largest distance of the state of an orbit from its image, relative to the extent of each component (a choice)."""
 
 ROUNDING = 10.0 * TOLERANCE
-"""Largest error of the integration, relative to a state (a choice); a sliding speed below this part of its extent is one."""
+"""Largest error of the integration, relative to a state (a choice); a smaller sliding speed, relative to its extent, is
+an
+error too."""
 
 TRAVELLED = 1e-3
-"""An orbit that moves less than this part of the way on which Newton's method came to it is measured by that part (a choice)."""
+"""The extent of an orbit is at least this part of the distance that Newton's method went from its start (a choice)."""
 
 ASTRAY = 1e6
 """Newton's method ends if it goes farther than this many extents of the motion from its start (a choice)."""
@@ -86,8 +88,8 @@ class PeriodicOrbit(Labelled):
     state : ndarray, shape (components,)
         State at the beginning of a period of the drive, or anywhere on the orbit of an undriven oscillator.
     multipliers : ndarray, shape (components,)
-        Floquet multipliers of the oscillator alone, the largest first; without a drive one of them is 1, that of a shift along
-        the orbit.
+        Floquet multipliers of the oscillator alone, the largest first; without a drive one of them is 1, that of a
+        shift along the orbit.
     residual : float
         Largest distance of the state from its image.
     steps : int
@@ -95,8 +97,8 @@ class PeriodicOrbit(Labelled):
     free : float
         The time after which the motion of an undriven oscillator repeats itself; 0 with a drive.
     extent : ndarray, shape (components,)
-        How far each component moves, by which distances between states are measured; one that rests is measured by the
-        way on which Newton's method came to it.
+        Extent of each component, the unit of distances between states. For a component at rest, the unit follows from
+        the distance that Newton's method went from its start.
     """
 
     scene: Scene = field(repr=False)
@@ -173,7 +175,7 @@ class PeriodicOrbit(Labelled):
         return next((k for k in divisors if self.meets(points[k])), self.periods)
 
     def meets(self, state: np.ndarray) -> bool:
-        """Return whether a state is that of the orbit at the beginning of a period, to within SAME and turns of angles."""
+        """Return whether a state is one of the orbit's `points`, to within SAME and whole turns of angles."""
         gap = state - self.state
         return closed(gap - whole_turns(self.scene, gap), SAME * self.extent, self.state)
 
@@ -201,11 +203,11 @@ def periodic_orbit(
     parameters: Mapping[str, float] | None = None,
     **more: float,
 ) -> PeriodicOrbit:
-    """Find a periodic orbit of a scene's oscillator: of one, which all of a network follow in step.
+    """Find a periodic orbit of one oscillator of a scene, which is also the synchronous orbit of a network.
 
-    `PeriodicOrbit.transversal_multipliers` decides whether a network stays in step.  Of the scene, model, parameters,
-    initial state, transient with its unit, integrator and max_steps count.  The tolerance is 1e-12, nothing is recorded,
-    and axes, draws and `stop` are refused.
+    `PeriodicOrbit.transversal_multipliers` decides whether a network stays synchronous.  The scene provides the model,
+    parameters, initial state, transient with its unit, integrator and max_steps.  The tolerance is 1e-12, nothing is
+    recorded, and axes, draws and `stop` are refused.
 
     Parameters
     ----------
@@ -214,8 +216,8 @@ def periodic_orbit(
     periods : int
         Number of drive periods after which the orbit repeats itself; 1 without a drive.
     start : array_like, shape (components,), optional
-        Start of Newton's method; by default the scene's initial state after its transient.  Of an undriven oscillator it is a
-        state from which the orbit is reached, and the orbit must attract; its transient counts mean return times.
+        Start of Newton's method; by default the scene's initial state after its transient.  For an undriven oscillator,
+        the motion from the start must reach the orbit, which must attract; the transient counts mean return times.
     parameters : mapping of str to float, optional
         Parameters of the scene to set, for names that are keywords already.
     **more : float
@@ -311,7 +313,7 @@ def _newton(scene: Scene, periods: int, start: np.ndarray) -> PeriodicOrbit:
 
 
 def relative(distance: np.ndarray, extent: np.ndarray) -> float:
-    """Return the largest component of a distance in units of the extent of the motion, or in its own unit without one."""
+    """Return the largest component of a distance, in units of the extent; a component without extent is not scaled."""
     return float(np.abs(distance / np.where(extent > 0.0, extent, 1.0)).max())
 
 
@@ -321,7 +323,10 @@ def closed(gap: np.ndarray, allowed: np.ndarray, state: np.ndarray) -> bool:
 
 
 def whole_turns(scene: Scene, differences: np.ndarray) -> np.ndarray:
-    """Return the whole turns in differences (..., components) of the states of one oscillator; 0 where it has no angle."""
+    """Return the whole turns in differences (..., components) of the states of one oscillator.
+
+    0 where it has no angle.
+    """
     # Links do not move an orbit of one oscillator, so its equations alone decide which components are angles.
     (periods,) = periods_of_kinds(Equations.of_equal_nodes(scene.equations.node, None, 1))
     turns = np.zeros_like(differences)
@@ -370,7 +375,7 @@ def _nearly_sticks(image: np.ndarray, gap: np.ndarray, extent: np.ndarray) -> bo
 
 
 def _sticks_throughout(image: np.ndarray, matrix: np.ndarray) -> bool:
-    """Return whether a body sticks over all periods: the map shifts its place and forgets its velocity, M = diag(1, 0)."""
+    """Return whether a body sticks in all periods: the map only shifts the position, so that M = diag(1, 0)."""
     return len(image) > len(matrix) and image[-1] == 0.0 and np.array_equal(matrix, np.diag([1.0, 0.0]))
 
 
@@ -482,7 +487,10 @@ def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
 def _strobe(
     scene: Scene, state: np.ndarray, periods: int, alpha: float, free: float = 0.0, extent: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the state some periods later, of the drive or of length `free`, and the propagator of a mode of strength alpha."""
+    """Return the state some periods later, and the propagator of a mode of strength alpha.
+
+    A period is that of the drive, or has the length `free`.
+    """
     problem, first = _problem(scene, state, alpha, free or scene.period, extent)
     propagators, logarithms, image = cycle_propagators(problem, first, periods)
     if (size := float(logarithms[0, 0])) > 700.0:  # double precision ends at exp(709.8)

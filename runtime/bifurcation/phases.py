@@ -1,13 +1,14 @@
-"""Phases of stick and slip of a periodic orbit, and its distance from orbits with other phases.
+"""Find the phases of stick and slip of a periodic orbit, and the distance of the orbit from a change of phases.
 
-The orbit is sampled over one cycle.  Its margin is a function of time that reaches zero where a phase ends: in stick the
-distance of the load from the limits of static friction, in slip the sliding speed.
+The orbit is sampled over one cycle.  Its margin is a function of time that reaches zero where a phase ends: in stick
+the distance of the load from the limits of static friction, in slip the sliding speed.
 
 * gap: the least minimum of the margin inside a phase; it closes in grazing.
 * landing: the distance of the load from the limits at the end of slip; below zero the body turns at once (stick loss).
 
-Minima and landings are those of polynomials through neighbouring samples, whose error is far below that of the orbit.  A
-stick shorter than the distance of two samples is recognised by the load at its beginning; a slip as short as that is not seen.
+Minima and landings are computed from polynomials through neighbouring samples; their error is far below that of the
+orbit. A stick shorter than the distance of two samples is recognised by the load at its beginning; so short a slip is
+missed.
 
 Source: di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth Dynamical Systems (Springer, 2008), chapters 7-8.
 """
@@ -97,7 +98,7 @@ Function = Callable[..., np.ndarray]
 
 
 def _margins(scene: Scene, event: Event) -> tuple[Function, Function]:
-    """Return the distance of the load from the limits of friction (of place and time), and the sliding speed (of velocity)."""
+    """Return two functions: the distance of the load from the limits of friction, and the sliding speed."""
     up, down, sliding = _functions(event, tuple(scene.equations.node.state), tuple(scene.parameters))
     values = list(scene.parameters.values())
     return (

@@ -1,10 +1,11 @@
-"""The skeleton of a bifurcation diagram: branches of periodic orbits of few periods, stable or not.
+"""Find the skeleton of a bifurcation diagram: branches of periodic orbits of few periods, stable or not.
 
-A chaotic motion comes close to every periodic orbit on its attractor again and again, and a transient to those beside it.
-States x with P^k(x) near x, P the stroboscopic map, are therefore good starts for Newton's method (Auerbach et al.).
+A chaotic motion comes close to every periodic orbit on its attractor again and again; a transient comes close to orbits
+near the attractor. P is the stroboscopic map. States x with P^k(x) near x are therefore good starts for Newton's method
+(Auerbach et al.).
 
 1. At some values of the parameter, motions from many starts are followed, and states that nearly return are collected.
-2. Newton's method makes them orbits; one that a branch passes through already is left out.
+2. Newton's method finds an orbit from each state; an orbit that is already on a branch is left out.
 3. Each new orbit is followed up and down, and at a fold the search goes on along the other sheet.
 
 Source: Auerbach, Cvitanovic, Eckmann, Gunaratne & Procaccia, Phys. Rev. Lett. 58, 2387 (1987).
@@ -44,7 +45,8 @@ STARTS, LENGTH, DROPPED = 96, 200, 20
 """Number of motions that are searched for returns, their length and their transient in drive periods (choices)."""
 
 SCALES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
-"""Sizes of the boxes of starts around the motion from the scene's own start, relative to the extent of that motion (choices)."""
+"""Sizes of the boxes of starts around the motion from the scene's own start, relative to the extent of that motion
+(choices)."""
 
 MOST_STEPS = 100_000
 """Most steps of a motion in a drive period; one that takes more is left out (a choice)."""
@@ -56,7 +58,8 @@ NEARER = 4
 """The other sheet at a fold is entered at 4^-NEARER of the distance between fold and last orbit (a choice)."""
 
 CLOSE, APART, TRIES = 0.05, 0.02, 12
-"""Largest distance of a return and least distance between starts, relative to the extent of the motion, and most starts for
+"""Largest distance of a return and least distance between starts, relative to the extent of the motion, and most starts
+for
 one period (choices)."""
 
 
@@ -69,7 +72,7 @@ class Skeleton(Labelled):
     branches : tuple of Branch
         Each rises in the parameter; sorted by the number of periods and the first value.
     searched : mapping of str to (float, float)
-        Between which initial values of each component motions were searched for orbits.
+        Range of initial values of each component in the search.
     """
 
     branches: tuple[Branch, ...]
@@ -139,11 +142,10 @@ def skeleton(
     parameters: Mapping[str, float] | None = None,
     **more: float,
 ) -> Skeleton:
-    """Find the skeleton of a bifurcation diagram.
+    """Find the skeleton of a bifurcation diagram: its branches of periodic orbits.
 
-    Orbits are found from near returns at some of the values and followed up and down from there. An
-    orbit that repeats itself after fewer periods is left out, and so is one that a branch passes
-    through already.
+    Orbits are found from near returns at some of the values, and followed up and down from there. An
+    orbit is left out if it repeats itself after fewer periods, or if it is already on a branch.
 
     Parameters
     ----------
@@ -257,7 +259,10 @@ def _transient(scene: Scene, transient: float | None) -> float:
 
 
 def _box(scene: Scene, ranges: Mapping[str, Range]) -> np.ndarray:
-    """Return the ends (2, components) of the ranges; a component without a range has the scene's initial value twice."""
+    """Return the ends (2, components) of the ranges.
+
+    A component without a range has the scene's initial value twice.
+    """
     names = [name for name in scene.components if name != SLIP.name]
     check_keys("skeleton: ranges", check_table("skeleton: ranges", ranges), names)
     ends = np.array([[scene.initial[name][0]] * 2 for name in names], dtype=float).T
@@ -272,7 +277,7 @@ def _box(scene: Scene, ranges: Mapping[str, Range]) -> np.ndarray:
 
 
 def starts_of(scene: Scene, seed: int, box: np.ndarray | None = None) -> np.ndarray:
-    """Return the starts (STARTS, components) of a search: the scene's own, and random ones around its motion, or in a box."""
+    """Return the starts (STARTS, components) of a search: the scene's own, and random states around its motion or in a box."""
     first = _first_start(scene)
     share = np.random.default_rng(seed).uniform(0.0, 1.0, (STARTS, len(first)))
     if box is None:
@@ -407,7 +412,8 @@ def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrb
             if not inner:
                 continue
             end, last = float(branch.values[k]), branch.orbits[k]
-            # Near a fold both sheets lie at distances +-c sqrt|p - p_fold| from it: at 4^-j of the way, 2^-j of the distance.
+            # Near a fold both sheets lie at distances +-c sqrt|p - p_fold| from it: at 4^-j of the way, 2^-j of the
+            # distance.
             values = [fold + 4.0**-j * (end - fold) for j in range(NEARER, -1, -1)]
             try:
                 start = turn.orbit.state - 2.0**-NEARER * (last.state - turn.orbit.state)

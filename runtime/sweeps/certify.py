@@ -49,8 +49,9 @@ exponents
 are averaged. Choices."""
 
 ALIKE, CLOSE = 0.25, 1e-3
-"""Two motions count as one if their means differ by less than ALIKE times their extents and less than CLOSE times the
-extent of all motions of a group."""
+"""Two motions count as one if their means differ by less than ALIKE times the larger extent of both, plus CLOSE times
+the
+extent of all motions of a group (choices)."""
 
 
 @dataclass
