@@ -218,7 +218,7 @@ def closed_form(name: str, **options: object) -> ClosedForm:
         form: ClosedForm = formula(**options)
     except ValueError as error:
         raise ValueError(f"topology {name}: {error}") from None
-    # Name the form with the given options only, as in cayley_abelian(shape=(p, q)).
+    # Name the form with the given options only, as in torus(shape=(p, q)).
     shown = ", ".join(
         f"{key}=({', '.join(map(str, value))})" if isinstance(value, tuple) else f"{key}={value}"
         for key, value in form.options.items()
