@@ -137,7 +137,7 @@ class Equations(_Cached, HasLatex):
 
     @property
     def listed(self) -> tuple[Layer, ...]:
-        """The layers whose links are a list."""
+        """The layers with a list of links, without mean fields."""
         return tuple(layer for layer in self.layers if layer.links and not isinstance(layer.links, AllPairs))
 
     @property

@@ -189,7 +189,7 @@ def layered_network(
     varied: tuple[str, ...] = (),
 ) -> Equations:
     """Return the equations of nodes of one or several kinds, joined by one or several layers of links."""
-    # Split the varied parameters into those of nodes and those of links.
+    # Split the varied parameters into parameters of nodes and parameters of links.
     names = {s.name for single in singles for s in single.parameters}
     apart = Equations(tuple(singles), tuple(kinds), (), tuple(name for name in varied if name in names))
     of_links = [name for name in varied if name not in names]

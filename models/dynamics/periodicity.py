@@ -34,7 +34,7 @@ class Drive:
     problem: str = ""  # the reason for no period (at all or at some values), as a predicate of "the oscillator …"
     # pi over the time in which other functions of time rise and fall again: sqrt(pi)/w for exp(-(t/w)**2).
     bends: tuple[sp.Expr, ...] = ()
-    gaps: tuple[sp.Expr, ...] = ()  # expressions of time at whose zeros the drive jumps or has a kink
+    gaps: tuple[sp.Expr, ...] = ()  # expressions of time that are zero where the drive jumps or has a kink
     # Arguments of functions such as tanh, which rise once near the zero of the argument, while it changes by about one.
     rises: tuple[sp.Expr, ...] = ()
 

@@ -56,7 +56,7 @@ def edge(
     else:
         rates, inertia = terms.rates, ()
 
-    # Parameters of the edge: all of the coupling, and those of the nodes that occur in the terms.
+    # Parameters of the edge: all parameters of the coupling, and parameters of the nodes that occur in the terms.
     used = {s for e in (*rates, *(e for block in inertia for row in block for e in row)) for s in e.free_symbols}
     strengths = tuple(sp.Symbol(name, real=True) for name in coupling.parameters)
     symbols = tuple(s for s in single.parameters if s not in strengths and s in used)

@@ -61,7 +61,7 @@ class Node:
 
     @property
     def continuous(self) -> tuple[sp.Symbol, ...]:
-        """The states that change continuously: those before the mode of an event, or all."""
+        """The states that change continuously: all states except the mode of an event."""
         return self.state[:2] if self.events else self.state
 
     @property
@@ -85,7 +85,7 @@ class Node:
         )
 
     def without_unused_parameters(self, needed: Container[sp.Symbol] = ()) -> Node:
-        """Return the node without parameters that do not occur, except those that links need."""
+        """Return the node without parameters that occur neither in its expressions nor in `needed` (by links)."""
         used = set(_occurring(self.parameters, self.expressions))
         return replace(self, parameters=tuple(p for p in self.parameters if p in used or p in needed))
 

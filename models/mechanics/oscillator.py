@@ -71,7 +71,7 @@ class LagrangianModel:
     coordinates: tuple[Coordinate, ...]  # the generalised coordinates
     kinetic: sp.Expr  # the energies
     potential: sp.Expr
-    forces: tuple[sp.Expr, ...]  # a generalised force for each coordinate, without those of `dissipation`
+    forces: tuple[sp.Expr, ...]  # a generalised force for each coordinate, without the forces of `dissipation`
     dissipation: sp.Expr = sp.S.Zero  # Rayleigh's function R, half the power lost; -dR/dv is added to the forces
     scaling: Scaling | None = None  # the units of physical quantities
 

@@ -145,7 +145,7 @@ class Model:
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates of the oscillators: those components that have a velocity."""
+        """Names of the coordinates of the oscillators, the components that have a velocity."""
         return tuple(dict.fromkeys(name for kind in self.kinds for name in kind.oscillator.coordinates))
 
     def equations(self, varied: tuple[str, ...] = ()) -> Equations:

@@ -70,7 +70,7 @@ def schema() -> Table:
 
 
 def _rows() -> dict[str, Table]:
-    """Return the rows of the keywords whose form in a file does not follow from their type."""
+    """Return the rows of keywords that the type of the keyword does not determine."""
     oscillator, friction = _written_out()
     group = {"oscillator": oscillator, "friction": friction, "at": {"type": "array", "items": WHOLE, "minItems": 1}}
     uniform = {"low": NUMBER, "high": NUMBER, "seed": _of_type("seed", int)}

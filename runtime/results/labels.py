@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..cells.buffers import Buffers
 
 Variable = tuple[str, tuple[str, ...], np.ndarray]
-"""Name, dimensions besides those of the sweep, values with one row for each cell."""
+"""Name, dimensions besides the dimensions of the sweep, values with one row for each cell."""
 
 STATE = ("component", "node")
 """The dimensions of a state."""
