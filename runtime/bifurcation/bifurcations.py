@@ -12,7 +12,7 @@ monodromy matrix.
 | stick loss | the load at a landing, less the limit of static friction | only stick phases come or go |
 | grazing | the gap that closes inside a phase | phases come or go |
 
-Moduli sorted by size are continuous along a branch, and do not change sign at a saddle whose multipliers have the
+Moduli sorted by size are continuous along a branch, and none passes 1 at a saddle whose multipliers have the
 product 1. If two multipliers change places in one step, the signs of det(M + I) and det(M - I) show the crossing. A
 graze can be approached only from the side of fewer phases, where the closing gap is defined. Each orbit on the way has
 a sixteenth of the gap of the orbit before. Newton's method starts from a polynomial through these orbits, so that it

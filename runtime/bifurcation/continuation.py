@@ -182,7 +182,7 @@ def det(orbit: PeriodicOrbit, point: float) -> float:
 
 
 def turns(arc: Arc, values: tuple[float, float], orbits: tuple[PeriodicOrbit, PeriodicOrbit]) -> bool:
-    """Return whether an arc turns back in its parameter between two orbits: det(M - I) changes its sign, det B does not."""
+    """Return whether an arc turns back between two orbits: det(M - I) changes its sign, and det B does not."""
     if (det(orbits[0], 1.0) < 0.0) == (det(orbits[1], 1.0) < 0.0):
         return False
     start, end = (np.append(orbit.state, value) for value, orbit in zip(values, orbits, strict=True))
@@ -191,7 +191,7 @@ def turns(arc: Arc, values: tuple[float, float], orbits: tuple[PeriodicOrbit, Pe
 
 
 def find_turn(arc: Arc, beyond: float) -> tuple[BifurcationKind, float, PeriodicOrbit] | None:
-    """Find the fold or the branch point at which an arc turns back before a value of its parameter, by arclength steps."""
+    """Find by arclength steps the fold or branch point at which an arc turns back before the value `beyond`."""
     if len(arc.values) < 2:
         return None
     slip_states = None if arc.phases[-1] is None else arc.phases[-1].slip_states

@@ -148,7 +148,7 @@ class PeriodicOrbit(Labelled):
 
     @property
     def stable(self) -> bool:
-        """True if every multiplier of one oscillator, but that of a shift along the orbit, lies inside the unit circle."""
+        """True if all multipliers, except the multiplier 1 of a shift along the orbit, lie inside the unit circle."""
         shift = [int(np.abs(self.multipliers - 1.0).argmin())] if self.free else []
         return bool(np.all(np.abs(np.delete(self.multipliers, shift)) < 1.0))
 
