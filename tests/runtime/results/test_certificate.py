@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import importlib
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
@@ -121,7 +121,7 @@ def test_cells_of_one_sweep_that_end_apart_have_exponents_of_their_own() -> None
 def test_an_interrupted_run_is_resumed_with_its_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from synchain.runtime.engines.job import SweepJob
 
-    module = sys.modules[run.__module__]
+    module = importlib.import_module("synchain.runtime.sweeps.run")
     work, certified, calls = SweepJob.run, module.with_certificate, []
 
     def certificate(prepared: PreparedRun) -> PreparedRun:

@@ -136,7 +136,7 @@ def test_modes_of_contacts_of_each_cell_follow_from_the_other_states() -> None:
         ({"sigma": [0.05, 0.2]}, r"found cells of sigma = 0\.05, 0\.1; expected those of the sweep, 0\.05, 0\.2"),
         ({"delta": [0.1, 0.2]}, r"several cells, along sigma \(2\)"),
         ({"sigma": [0.05, 0.1], "certified": True}, "certified: found a start of several cells"),
-        ({"sigma": [0.05, 0.1], "reduce": reduce_scene(DRIVEN)}, "a Reduction beside a start of several cells"),
+        ({"sigma": [0.05, 0.1], "reduce": reduce_scene(DRIVEN)}, "a ReducedScene beside a start of several cells"),
     ],
 )
 def test_cells_of_another_sweep_are_refused(more: dict[str, Any], message: str) -> None:
