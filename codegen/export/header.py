@@ -17,7 +17,7 @@ SHOWN = 12
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """Equations in names of the exported text, values of the parameters (empty if not given), lines of the head."""
+    """What an export contains: equations with the names of its text, parameter values (may be empty), lines of its header."""
 
     model: Equations
     numbers: dict[str, float]

@@ -138,7 +138,7 @@ class SeriesGraph:
     def read(
         self, template: Template, moving: Mapping[sp.Symbol, Series], substitutes: Mapping[sp.Symbol, sp.Expr]
     ) -> list[Series]:
-        """Return the series of a template's results, given series of moving symbols and values of constant ones."""
+        """Return the series of a template's results; `moving` are the series of symbols that depend on time."""
         self.moving, self.substitutes, self.by_expression = dict(moving), dict(substitutes), {}
         for symbol, e in template.statements:
             self.moving[symbol] = self.of(e)

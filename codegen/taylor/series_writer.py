@@ -22,10 +22,12 @@ from .step_length import distant, last_orders, unseen
 
 @dataclass(frozen=True, slots=True)
 class Gaps:
-    """The two gaps of a contact (`Event.gaps`), the contact's mode, and the sizes of the terms of coefficient 0.
+    """Taylor series of the two gaps of a contact (`Event.gaps`), its mode, and sizes of the terms of coefficient 0.
 
-    names: the variables with these sizes; stuck: the variable that is 1 in stick and 0 in slip; room: memory for one
-    gap.
+    The sizes bound rounding errors.
+
+    names: variables that hold the sizes; stuck: variable that is 1 in stick and 0 in slip; room: memory for the
+    series of one gap.
     """
 
     mode: str

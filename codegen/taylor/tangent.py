@@ -164,7 +164,7 @@ class ModeWriter(Lines):
         return self.graph.sum(terms)
 
     def write(self) -> Function:
-        """Return the function `mode_step`."""
+        """Return the generated function `mode_step`: one Taylor step of the deviations along the orbit."""
         for k in range(self.order + 1):
             self.coefficients(k)
 

@@ -68,7 +68,7 @@ def nearest(ball_at: Callable[[int], Ball]) -> float | complex:
 
 
 def decimals(ball_at: Callable[[int], Ball], digits: int) -> sp.Expr:
-    """Return the value as a SymPy Float, within one unit of the last of `digits`.
+    """Return the value as a SymPy Float of `digits` digits, correct to one unit of the last digit.
 
     A complex value is returned as real + imaginary * I.  Raises ValueError like `accurate`.
     """

@@ -55,7 +55,10 @@ def union(first: ClosedForm, second: ClosedForm) -> ClosedForm:
 
 
 def box(part: ClosedForm, sizes: Sequence[sp.Expr], indices: Sequence[sp.Symbol]) -> ClosedForm:
-    """Return the Cartesian product of chains or rings; `indices` number the eigenvalues of each direction."""
+    """Return the closed-form spectrum of a Cartesian product of chains or rings (grid, torus).
+
+    `indices` are the indices of the eigenvalue in each direction.
+    """
     (n,) = part.symbols
     ((old, _, _),) = part.terms[0].indices
     parts = [renamed(part, {n: size, old: k}) for size, k in zip(sizes, indices, strict=True)]

@@ -73,6 +73,6 @@ def _check_masses(oscillator: Oscillator, values: tuple[tuple[str, float], ...])
 
 @lru_cache(maxsize=64)
 def _masses(oscillator: Oscillator) -> tuple[sp.Matrix, tuple[sp.Symbol, ...]]:
-    """Return the mass matrix in the parameters, and the velocities of its rows."""
+    """Return the mass matrix as a function of the parameters, and the velocities that its rows belong to."""
     system = nondimensional(oscillator)
     return mass_matrix(system.kinetic, system.velocities), system.velocities

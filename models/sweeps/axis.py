@@ -39,7 +39,7 @@ class Axis:
 
     @classmethod
     def between(cls, name: str, first: float, last: float, count: int) -> Axis:
-        """Return an axis of `count` equally spaced values, both ends included; each is the float nearest to its decimal."""
+        """Return an axis of `count` equally spaced values from first to last: exact decimals, rounded to the nearest floats."""
         what = f"axis {name}"
         ends = [Fraction(repr(check_number(f"{what}: {end}", value))) for end, value in (("from", first), ("to", last))]
         size = check_integer(f"{what}: count", count, 1, LIMIT)

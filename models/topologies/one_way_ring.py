@@ -18,7 +18,7 @@ def spectrum(n: int) -> Eigenvalues:
 
 
 def formula() -> ClosedForm:
-    """-1 + exp(2πik/n) and its wave."""
+    """Return the eigenvalues exp(2πik/n) - 1; eigenvectors are the Fourier modes exp(2πijk/n) at node j."""
     from sympy import I, S, exp, pi
 
     from ..graphs.closed_forms import NODE, ClosedForm, K, N, Term

@@ -26,7 +26,7 @@ def spectrum(n: int) -> Eigenvalues:
 
 
 def formula() -> ClosedForm:
-    """-4 sin²(kπ/n) and its wave."""
+    """Return the eigenvalues -4 sin²(kπ/n); eigenvectors are the Fourier modes exp(2πijk/n) at node j."""
     from sympy import I, Integer, S, exp, pi, sin
 
     from ..graphs.closed_forms import NODE, ClosedForm, K, N, Term

@@ -318,7 +318,7 @@ class BranchTracer:
             length = min(step, abs(value - last))
             at = value if step >= abs(value - last) else last + math.copysign(step, value - last)
             next_orbit = self._orbit_on_branch(at)
-            # An orbit of other phases: halve the step until the change is located.
+            # The next orbit sticks and slips in another order: halve the step until the parameter of the change is bracketed.
             if next_orbit is not None and length > APART * span and self._changes(next_orbit[1]):
                 longest = 0.5 * length
                 continue

@@ -49,7 +49,7 @@ def execute(arguments: Namespace) -> int:
     try:
         for file in written(wanted, target, arguments.quick, arguments.workers, None):
             files.append(file)
-    finally:  # at Ctrl-C too; not before, since a bar may stand on the terminal
+    finally:  # at Ctrl-C too, and after the progress bar
         for file in files:
             print(file)
     return FINE

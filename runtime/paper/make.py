@@ -20,7 +20,7 @@ AT_ONCE = 2
 
 
 def make(names: Iterable[str] | None, out: str | PathLike[str], **options: Any) -> list[Path]:
-    """Compute and draw figures; return their files. `written` documents the arguments."""
+    """Compute and draw figures; return the paths of their files. The arguments are those of `written`."""
     return [*written(names, out, **options)]
 
 

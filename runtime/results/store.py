@@ -51,7 +51,7 @@ class Form:
     check: Callable[[Path], None]  # raise OSError if a path exists and cannot be replaced
     whole: Callable[[Path], AbstractContextManager[Path]]  # yield a temporary path, then move it to the path
     write: Callable[[xr.Dataset, Path], None]  # write a dataset to a path, without its digest
-    # yield the sheet of a new file: the template with other lengths of some dimensions
+    # open a new file for writing by rows: variables and attributes of a template, some dimensions with other lengths
     rows: Callable[[xr.Dataset, Mapping[str, int], Path], AbstractContextManager[Sheet]]
     seal: Callable[[Path], None]  # write the digest of a file into it
     open: Callable[[Path], xr.Dataset]  # verify the digest and return the dataset, which is read lazily

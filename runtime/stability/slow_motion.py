@@ -1,4 +1,4 @@
-"""Warn of undriven motion that is too slow for its transient and its average."""
+"""Warn if undriven motion is so slow that the transient and the averaging time are too short for it."""
 
 from __future__ import annotations
 

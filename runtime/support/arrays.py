@@ -25,7 +25,7 @@ def numbers(what: str, values: object, *, complex_too: bool = False) -> np.ndarr
 
 
 def row(what: str, values: ArrayLike, least: int = 1, *, rising: bool = False, complex_too: bool = False) -> np.ndarray:
-    """Return the values as one row (m,) of floats or, if `complex_too`, of complex numbers, up to LARGEST in size."""
+    """Return values as a row (m,) of floats, or of complex numbers if `complex_too`; no entry may exceed LARGEST in size."""
     array = np.atleast_1d(numbers(what, values, complex_too=complex_too))
     if not np.all(np.isfinite(array)):
         raise ValueError(f"{what}: found {array[~np.isfinite(array)][0]}; expected finite numbers")

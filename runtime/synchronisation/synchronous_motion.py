@@ -45,7 +45,7 @@ class SynchronousMotion:
 
     extent: (
         np.ndarray
-    )  # (compared components,): without drift; for a component that comes to rest, the extent of its approach
+    )  # (compared components,): range without its drift; of a component that comes to rest, range of the approach
     radian: float  # time in which the motion turns by a radian
     pace: float  # number of steps in a unit of time
     unit: float  # the scene's unit of time

@@ -421,7 +421,10 @@ def project(
 
 
 def critical_ratio(spectrum: Spectrum) -> float:
-    """Return the ratio of the largest to the smallest non-zero |gamma|; a bounded range of alpha needs this ratio."""
+    """Return max |gamma| / min |gamma| over the non-zero eigenvalues.
+
+    A bounded stable range of alpha contains all modes at some strength only if its ends have at least this ratio.
+    """
     sizes = [abs(value) for value in spectrum.values if abs(value) > 0.0]
     return max(sizes) / min(sizes)
 
