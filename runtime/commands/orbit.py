@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING
 
 from ..console.arguments import positive, spaced
@@ -43,7 +43,10 @@ def execute(arguments: Namespace) -> int:
             raise WrongUse(
                 f"--follow: found {arguments.follow!r}; expected a parameter and its values, e.g. omega=1:1.3:31"
             )
-        values = spaced(text)
+        try:
+            values = spaced(text)
+        except ArgumentTypeError as error:
+            raise WrongUse(f"--follow: {error}") from None
 
     def branch(scene: Scene, periods: int = 1) -> Branch:
         """Follow the orbit that is found at the first value."""

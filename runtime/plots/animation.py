@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -38,6 +39,13 @@ class Animation(FuncAnimation):
     """An animation that a notebook plays; `save("motion.gif")` writes it, `plt.show()` shows it in a window."""
 
     figure: Figure
+
+    def save(self, filename: str | Path, writer: Any = None, *more: Any, **options: Any) -> None:
+        """Write a GIF file (Pillow), or a film (ffmpeg)."""
+        ending = Path(filename).suffix.lower()
+        if writer is None and ending not in (".gif", ".mp4", ".webm", ".mov"):
+            raise ValueError(f"save: found the ending {ending!r}; expected .gif, .mp4, .webm or .mov")
+        super().save(filename, writer or ("pillow" if ending == ".gif" else "ffmpeg"), *more, **options)
 
     def _repr_html_(self) -> str:
         plt.close(self.figure)  # otherwise the notebook also shows the first frame

@@ -189,8 +189,10 @@ def _(value: PeriodicOrbit, axes: Axes, **style: Any) -> Axes:
     """Draw the closed curve of the first two components, with a dot at the start of each period."""
     # integrate one node without links over the period of the orbit
     start = {name: [x] for name, x in zip(value.components, value.state.tolist(), strict=True)}
+    of_node = {symbol.name for node in value.scene.equations.nodes for symbol in node.parameters}
     one = value.scene.replace(
         topology=Topology("one", 1, ()),
+        parameters={name: x for name, x in value.scene.parameters.items() if name in of_node},
         record=("trajectory",),
         samples=SAMPLES * value.periods,
         transient=0.0,

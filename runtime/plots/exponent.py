@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from synchain.models.inputs.checks import check_number
 from synchain.models.presentation.writer import Latex
 
 from ..stability.msf import MSF
@@ -51,7 +52,7 @@ def draw_exponent(axes: Axes, function: MSF, sigma: float | None = None, **style
 def _mark_modes(axes: Axes, function: MSF, sigma: float | None) -> None:
     """Mark the strengths sigma |gamma| of the modes of the network, if they are real and inside the plotted range."""
     scene = function.scene
-    strength = scene.parameters[scene.strength] if sigma is None else sigma
+    strength = scene.parameters[scene.strength] if sigma is None else check_number("sigma", sigma, 0.0)
     gamma = np.array([value for value in scene.topology.spectrum.values if value != 0]) if strength else np.array([])
     if not gamma.size or np.iscomplexobj(gamma):  # nothing to mark on a line
         return

@@ -172,6 +172,8 @@ def draw_graph(value: HasDrawing, ax: Axes | None = None, values: ArrayLike | No
 
 def _nodes(axes: Axes, picture: Picture, values: ArrayLike | None, style: dict[str, Any]) -> None:
     """Draw the nodes with their colours and labels, with a legend if there are several kinds."""
+    from matplotlib.patheffects import withStroke
+
     points, kind = picture.positions, np.array(picture.kind)
     size = (2.0 * POINTS * picture.radius) ** 2  # matplotlib takes the square of the diameter in points
     dots: dict[str, Any] = {"s": size, "zorder": 2, "linewidths": 0.0, **style}
@@ -196,6 +198,7 @@ def _nodes(axes: Axes, picture: Picture, values: ArrayLike | None, style: dict[s
                 y,
                 picture.short_label(i),
                 color="white" if values is None else "0.1",
+                path_effects=[] if values is None else [withStroke(linewidth=1.5, foreground="white")],
                 ha="center",
                 va="center_baseline",
                 fontsize=min(POINTS * picture.radius, 7.0),

@@ -9,6 +9,7 @@ import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from synchain.models.inputs.checks import suggestion
 from synchain.models.inputs.names import NodeName
@@ -62,7 +63,7 @@ def draw_result(
         draw, kept_axes = _DRAWING[chosen]
         cut, remark = _cut(result, kept_axes)
         draw(axes, cut, result, style)
-    if shaded := [(window.low, window.high) for window in windows]:
+    if shaded := _intervals(windows):
         if (along := _along(cut, result)[1] if cut.status.ndim else "") != result.scene.strength:
             raise ValueError(
                 f"windows: found a plot over {along or 'no parameter'}; expected one over {result.scene.strength}"
@@ -73,6 +74,16 @@ def draw_result(
     failed = int((result.data.status != Status.FINISHED).sum())
     note(axes, "; ".join(filter(None, [remark, failures(failed, result.data.status.size)])))
     return axes
+
+
+def _intervals(windows: object) -> list[tuple[float, float]]:
+    """Return the ends of windows: of a master stability function, windows themselves, or pairs."""
+    windows = getattr(windows, "windows", windows)
+    try:
+        pairs = [(w.low, w.high) if hasattr(w, "low") else tuple(w) for w in windows]  # type: ignore[attr-defined]
+        return [(float(low), float(high)) for low, high in pairs]
+    except (TypeError, ValueError):
+        raise ValueError("windows: expected those of a master stability function, or pairs (low, high)") from None
 
 
 def _possible(result: Result) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -240,6 +251,7 @@ def _space(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) 
     nodes = np.arange(1, result.scene.n + 1)
     painted = axes.pcolormesh(data.time.values, nodes, states.values.T, **{**PAINT, **style})
     axes.set(xlabel="time", ylabel="oscillator")
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     axes.figure.colorbar(painted, ax=axes, label=symbols(states))
 
 

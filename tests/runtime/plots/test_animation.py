@@ -58,3 +58,11 @@ def test_a_run_without_a_trajectory_is_refused() -> None:
         ValueError, match=r"animate: found no trajectory; record it: Scene\(…, record=\['trajectory'\]\)"
     ):
         result.animate()
+
+
+def test_an_ending_that_no_writer_has_is_refused_before_frames_are_drawn(tmp_path: Path) -> None:
+    scene = Scene("harmonic", "spring", chain(2), record=("trajectory",), samples=9, transient=0, window=1)
+    motion = run(scene, show_progress=False, width=1).animate(seconds=1, fps=2)
+    with pytest.raises(ValueError, match=r"save: found the ending '.txt'; expected .gif, .mp4, .webm or .mov"):
+        motion.save(tmp_path / "motion.txt")
+    motion._draw_was_started = True

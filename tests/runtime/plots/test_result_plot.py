@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 
 from synchain.models import Scene, chain, load_scene
 from synchain.models.dynamics.equations import Equations
-from synchain.runtime import Result, run
+from synchain.runtime import Result, periodic_orbit, run
 from synchain.runtime.plots import result_plot, style
 
 
@@ -224,3 +224,20 @@ def test_few_samples_a_turn_are_dots() -> None:
     assert {line.get_linestyle() for line in plot(coarse, "phase").lines} == {"None"}
     fine = run(scene.replace(samples=400), show_progress=False, width=1)
     assert {line.get_linestyle() for line in plot(fine, "phase").lines} == {"-"}
+
+
+def test_windows_may_be_pairs_and_anything_else_is_refused(pair: Callable[..., Result]) -> None:
+    result = pair(axes=SWEPT["error"])
+    (band,) = plot(result, windows=[(0.15, 0.25)]).patches
+    assert (band.get_x(), band.get_width()) == (0.15, pytest.approx(0.1))
+    for wrong in (3, [(1,)]):
+        with pytest.raises(ValueError, match=r"windows: expected those of a master stability function, or pairs"):
+            result.plot(windows=wrong)
+
+
+def test_an_orbit_of_a_coupled_scene_is_drawn() -> None:
+    """Its oscillator alone has no links, and so no strength of them."""
+    scene = Scene("duffing", "spring", chain(2), parameters={"delta": 0.2, "omega": 1.3, "sigma": 0.1})
+    orbit = periodic_orbit(scene)
+    x, _ = orbit.plot().lines[0].get_data()
+    assert (x[0], x[-1]) == pytest.approx((orbit.state[0],) * 2, abs=1e-6)
