@@ -113,19 +113,18 @@ def execute(arguments: Namespace) -> int:
 
 def _write(function: MSF | Plane, folder: Path) -> list[Path]:
     """Write numbers and plot, over complex strengths with the rays of modes; return both paths."""
-    from ..plots.canvas import SIZE
+    from ..plots.canvas import off_screen
     from ..plots.csv_table import as_csv
     from ..plots.plane import draw_rays
-    from ..plots.style import context, new_figure
     from ..stability.msf import Plane
     from ..support.files import whole_file, write_text
 
     paths = [folder / f"{type(function).__name__.lower()}{ending}" for ending in (".csv", ".png")]
     table = function.data[["exponent", "stderr"]].to_dataframe().reset_index()
     write_text(paths[0], as_csv(tuple(table.columns), table.itertuples(index=False, name=None)))
-    with context(), whole_file(paths[1]) as temporary:
-        figure, scene = new_figure(SIZE), function.scene
-        axes = function.plot(figure.add_subplot())
+    with off_screen() as (figure, axes), whole_file(paths[1]) as temporary:
+        scene = function.scene
+        function.plot(axes)
         if isinstance(function, Plane) and function.has_windows:
             draw_rays(axes, function, scene.parameters[scene.strength] or None)
         figure.savefig(temporary, dpi=200)

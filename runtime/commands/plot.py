@@ -34,12 +34,7 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Draw the value and print the name of the picture."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-
-    from ..plots.canvas import SIZE
-    from ..plots.style import context, new_figure
+    from ..plots.canvas import off_screen
     from ..results.open import open_result
     from ..results.result import Result
     from ..support.files import whole_file
@@ -54,11 +49,10 @@ def execute(arguments: Namespace) -> int:
         if arguments.kind is not None and not isinstance(value, Result):
             raise WrongUse(f"--kind: {path} holds a {type(value).__name__}, which has one kind of plot; leave it out")
         options = {} if arguments.kind is None else {"kind": arguments.kind}
-        with context():
-            figure = new_figure(SIZE)
+        with off_screen() as (figure, axes):
             if target.suffix.removeprefix(".") not in figure.canvas.get_supported_filetypes():
                 raise WrongUse(f"{target}: found the ending {target.suffix!r}; expected .png, .svg or .pdf")
-            value.plot(figure.add_subplot(), **options)
+            value.plot(axes, **options)
             with whole_file(target) as temporary:
                 figure.savefig(temporary, dpi=DOTS)
     print(f"  {target}")

@@ -253,17 +253,15 @@ def _drawn(target: Path) -> Path:
     """Draw the figure of a result from its file; raise Failed with the reason if that fails."""
     path = target.with_suffix(".png")
     try:
-        from ..plots.canvas import SIZE
+        from ..plots.canvas import off_screen
         from ..plots.result_plot import draw_result
-        from ..plots.style import context, new_figure
         from ..results.labels import scene_of
         from ..results.result import Result
         from ..results.store import opened
         from ..support.files import whole_file
 
-        with opened(target) as data, context():  # read as far as it is drawn
-            figure = new_figure(SIZE)
-            draw_result(Result(data, scene_of(data.attrs)), figure.add_subplot())
+        with opened(target) as data, off_screen() as (figure, axes):  # read as far as it is drawn
+            draw_result(Result(data, scene_of(data.attrs)), axes)
             with whole_file(path) as temporary:
                 figure.savefig(temporary, dpi=150)
         return path

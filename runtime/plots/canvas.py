@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.cbook import normalize_kwargs
 from matplotlib.collections import PathCollection
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+
+from .style import context, new_figure
 
 SIZE = (4.8, 3.4)
 """Width and height in inches of figures without a window."""
+
+
+@contextmanager
+def off_screen() -> Iterator[tuple[Figure, Axes]]:
+    """Yield a figure that belongs to no window, in the style of the figures, and its axes."""
+    with context():
+        figure = new_figure(SIZE)
+        yield figure, figure.add_subplot()
 
 
 def axes_of(ax: Axes | None) -> Axes:

@@ -138,14 +138,12 @@ def rows_table(rows: Iterable[tuple[str, str]]) -> str:
 
 def figure(plot: Callable[[Axes], Axes], description: str) -> str:
     """Return a plot as an image embedded in the page, drawn without pyplot."""
-    from ..plots.canvas import SIZE
-    from ..plots.style import context, new_figure
+    from ..plots.canvas import off_screen
 
     buffer = io.BytesIO()
-    with context():
-        canvas = new_figure(SIZE)
-        plot(canvas.add_subplot())
-        canvas.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
+    with off_screen() as (drawn, axes):
+        plot(axes)
+        drawn.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
     text = base64.b64encode(buffer.getvalue()).decode()
     return f'<img alt="{escape(description, quote=True)}" src="data:image/png;base64,{text}"/>'
 
