@@ -396,11 +396,15 @@ class Search:
         if rate:
             mass = self.network.mass(self.state)
             matrix = matrix - rate * (sparse.eye_array(len(gap), format="csc") if mass is None else mass)
-        if count:
+        if count:  # pin the first node of each shift: a full row e' would fill the factors
             border = sparse.csc_array(self.shifts)
-            matrix = sparse.block_array([[matrix, -border], [border.T, None]], format="csc")
+            pinned = self.shifts.argmax(axis=0)
+            pins = sparse.csc_array((np.ones(count), (np.arange(count), pinned)), (count, len(gap)))
+            matrix = sparse.block_array([[matrix, -border], [pins, None]], format="csc")
         change = _solve_linear(matrix, np.append(-gap, np.zeros(count)))
-        return change[: len(gap)], change[len(gap) :]
+        step, speeds = change[: len(gap)], change[len(gap) :]
+        # Of all steps that differ by shifts, take the one normal to them; their vectors have no states in common.
+        return step - self.shifts @ (self.shifts.T @ step / self.shifts.sum(axis=0)), speeds
 
     def newton(self) -> bool:
         """Advance by Newton's method, and return whether it reached an equilibrium."""

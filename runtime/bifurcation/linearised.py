@@ -8,8 +8,8 @@ add to it; Jacobian and mass matrix are sums of small dense blocks, assembled in
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import sympy as sp
@@ -24,48 +24,83 @@ from synchain.models.mechanics.components import Block, Edge
 Values = Callable[..., list[float | np.ndarray]]
 """Expressions as a function of states and parameters, each a number or an array (count,)."""
 
+Parameter: TypeAlias = str | tuple[str, ...] | np.ndarray
+"""The name of a parameter, its names at all nodes or links, or the weights of links."""
+
 
 class TermTemplate(NamedTuple):
     """The expressions of all nodes of a kind, or of all links of a layer between two kinds; `count` of them."""
 
-    symbols: list[sp.Symbol]  # of the states, then of the parameters
+    states: list[sp.Symbol]  # of the node; of the link's target, then of its source
+    others: list[sp.Symbol]  # weight and parameters
     rates: tuple[sp.Expr, ...]  # (p,): added to the rates of a node
-    slopes: list[Block]  # (p, p) each: derivatives of the rates by the states of each array of `states`
-    masses: list[Block]  # (p, p) each: what is added to M, block by block as `slopes`
+    masses: list[Block]  # (p, p) each: what is added to M, a block for each array of `indices`
     # (count, p) each: indices of the node's states in the state of the network; for links of the target's, of the source's
-    states: tuple[np.ndarray, ...]
-    parameters: list[float | np.ndarray]  # one value for all, or (count,)
+    indices: tuple[np.ndarray, ...]
+    parameters: list[Parameter]
+
+    def along(self, dimension: int) -> TermTemplate:
+        """Return the template of r_x u, where the direction u follows the state of the network in one vector."""
+        directions = [sp.Symbol(f"along {s.name}", real=True) for s in self.states]
+        pairs = [*zip(self.states, directions, strict=True)]
+        rates = tuple(sp.Add(*(derivative(e, s) * u for s, u in pairs)) for e in self.rates)
+        if self.others[: len(directions)] == directions:  # a second derivative along the same direction
+            return self._replace(rates=rates)
+        # The directions are further states by which nothing is differentiated.
+        return self._replace(others=[*directions, *self.others], rates=rates, indices=self.indices)
 
 
 @dataclass(frozen=True, slots=True)
 class TemplateFunction:
-    """A compiled template: rates and blocks of all its nodes or links at a state of the network."""
+    """A compiled template: rates and matrix entries of all its nodes or links at a state of the network."""
 
-    values: Values  # rates, then the entries of the blocks row by row
+    rates: Values
     term_sizes: Values  # `term_size` of each rate
-    states: tuple[np.ndarray, ...]  # as in `TermTemplate`
-    parameters: tuple[float | np.ndarray, ...]
+    entries: Values  # entries of a sparse matrix, those that vanish identically left out
+    inputs: tuple[np.ndarray, ...]  # (count, p) each: indices of the states among the arguments
+    pattern: tuple[np.ndarray, np.ndarray]  # (entries, count) each: row and column of each entry
+    names: tuple[Parameter, ...]
+    parameters: tuple[float | np.ndarray, ...] = ()  # one value for all, or (count,)
 
     @classmethod
-    def of(cls, template: TermTemplate, rates: tuple[sp.Expr, ...], blocks: list[Block]) -> TemplateFunction:
-        """Compile rates and blocks of a template."""
-        symbols, entries = template.symbols, [e for block in blocks for row in block for e in row]
-        states = frozenset(symbols[: sum(indices.shape[1] for indices in template.states)])
-        values = sp.lambdify(symbols, [*rates, *entries], ["scipy", "numpy"])
-        sizes = sp.lambdify(symbols, [term_size(e, states) for e in rates], ["scipy", "numpy"], cse=True)
-        return cls(values, sizes, template.states, tuple(template.parameters))
+    def of(cls, template: TermTemplate, dimension: int, masses: bool = False) -> TemplateFunction:
+        """Compile a template: rates with their Jacobian, or masses alone."""
+        size, symbols, indices = len(template.rates), [*template.states, *template.others], template.indices
+        blocks = template.masses if masses else _slopes(template)
+        places = [
+            (k, i, j) for k, block in enumerate(blocks) for i in range(size) for j in range(size) if block[i][j] != 0
+        ]
+        rows, columns = ([indices[0][:, i] for _, i, _ in places], [indices[k][:, j] for k, _, j in places])
+        # Directions stand before the parameters; they are taken from the second half of the vector.
+        directions = len(template.others) - len(template.parameters)
+        inputs = (*indices, *(each + dimension for each in indices)) if directions else indices
+        shape, states = (len(places), len(indices[0])), frozenset(template.states)
+        return cls(
+            sp.lambdify(symbols, template.rates, ["scipy", "numpy"]),
+            sp.lambdify(symbols, [term_size(e, states) for e in template.rates], ["scipy", "numpy"], cse=True),
+            sp.lambdify(symbols, [blocks[k][i][j] for k, i, j in places], ["scipy", "numpy"]),
+            inputs,
+            (np.reshape(rows, shape), np.reshape(columns, shape)),
+            tuple(template.parameters),
+        )
 
-    @property
-    def rows(self) -> np.ndarray:
-        """Indices (count, p) of the rates that are added to."""
-        return self.states[0]
+    def at(self, values: Mapping[str, float]) -> TemplateFunction:
+        """Return the same functions with numbers for the parameters."""
+
+        def number(name: Parameter) -> float | np.ndarray:
+            if isinstance(name, str):
+                return values[name]
+            return np.array([values[each] for each in name]) if isinstance(name, tuple) else name
+
+        return replace(self, parameters=tuple(map(number, self.names)))
 
     def evaluate(self, function: Values, state: np.ndarray) -> np.ndarray:
-        """Evaluate one of the functions at a state of the network. Shapes: returns (count, expressions)."""
-        columns = [column for indices in self.states for column in state[indices].T]
+        """Evaluate one of the functions at a state of the network. Shapes: returns (expressions, count)."""
+        columns = [column for indices in self.inputs for column in state[indices].T]
         with np.errstate(all="ignore"):  # far from the start rates may overflow or have no value
             results = function(*columns, *self.parameters)
-        return np.stack([np.broadcast_to(np.asarray(x, dtype=float), len(self.rows)) for x in results], axis=1)
+        count = len(self.inputs[0])
+        return np.array([np.broadcast_to(np.asarray(x, dtype=float), count) for x in results]).reshape(-1, count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,52 +110,56 @@ class Linearised:
     dimension: int  # number of states
     rate_templates: tuple[TemplateFunction, ...]  # rates and blocks of the Jacobian
     mass_templates: tuple[TemplateFunction, ...]  # blocks of M alone; empty if M is the identity
+    templates: tuple[TermTemplate, ...]
+    constant_mass: bool  # False if M depends on the state
 
     @classmethod
     def of(cls, equations: Equations, values: Mapping[str, float]) -> Linearised:
         """Compile equations with the values of their parameters."""
-        templates = [*_node_templates(equations, values), *_link_templates(equations, values)]
-        rates = tuple(TemplateFunction.of(each, each.rates, each.slopes) for each in templates)
+        templates = (*_node_templates(equations), *_link_templates(equations))
         heavy = [each for each in templates if each.masses] if equations.inertial else []
-        return cls(equations.dimension, rates, tuple(TemplateFunction.of(each, (), each.masses) for each in heavy))
+        masses = tuple(TemplateFunction.of(each, equations.dimension, masses=True) for each in heavy)
+        return cls(equations.dimension, (), masses, templates, equations.constant_mass)._compiled().at(values)
+
+    def _compiled(self) -> Linearised:
+        return replace(self, rate_templates=tuple(TemplateFunction.of(each, self.dimension) for each in self.templates))
+
+    def at(self, values: Mapping[str, float]) -> Linearised:
+        """Return the equations with other values of their parameters; nothing is compiled."""
+        rates, masses = (tuple(each.at(values) for each in part) for part in (self.rate_templates, self.mass_templates))
+        return replace(self, rate_templates=rates, mass_templates=masses)
+
+    def along(self) -> Linearised:
+        """Return r_x u as a function of the vector (x, u), its Jacobian that by x; again, r_xx u u. `at` gives numbers."""
+        return replace(self, templates=tuple(each.along(self.dimension) for each in self.templates))._compiled()
 
     def rates(self, state: np.ndarray) -> np.ndarray:
         """Return r (dimension,) at a state."""
-        rates = np.zeros(self.dimension)
-        for template in self.rate_templates:
-            values = template.evaluate(template.values, state)
-            np.add.at(rates, template.rows, values[:, : template.rows.shape[1]])
-        return rates
+        sums = np.zeros(self.dimension)
+        for each in self.rate_templates:
+            np.add.at(sums, each.inputs[0].T, each.evaluate(each.rates, state))
+        return sums
 
     def term_sizes(self, state: np.ndarray) -> np.ndarray:
         """Return the sizes (dimension,) of the terms of r at a state: r is zero to rounding if it is far smaller."""
-        sizes = np.zeros(self.dimension)
-        for template in self.rate_templates:
-            values = template.evaluate(template.term_sizes, state)
-            np.add.at(sizes, template.rows, np.nan_to_num(values))  # 0 times an infinite slope is no number
-        return sizes
+        sums = np.zeros(self.dimension)
+        for each in self.rate_templates:  # 0 times an infinite slope is no number
+            np.add.at(sums, each.inputs[0].T, np.nan_to_num(each.evaluate(each.term_sizes, state)))
+        return sums
 
     def jacobian(self, state: np.ndarray) -> sparse.csc_array:
         """Return the derivative of r by the state, in sparse form."""
-        return self._assemble(self.rate_templates, state, 1)
+        return self._assemble(self.rate_templates, state)
 
     def mass(self, state: np.ndarray) -> sparse.csc_array | None:
         """Return M in sparse form, None if it is the identity."""
-        return self._assemble(self.mass_templates, state, 0) if self.mass_templates else None
+        return self._assemble(self.mass_templates, state) if self.mass_templates else None
 
-    def _assemble(self, templates: tuple[TemplateFunction, ...], state: np.ndarray, skipped: int) -> sparse.csc_array:
-        """Add the blocks of templates into a matrix; in their values `skipped` rows of rates come first."""
-        rows, columns, entries = [], [], []
-        for template in templates:
-            size, values = template.rows.shape[1], template.evaluate(template.values, state)
-            for k, states in enumerate(template.states):
-                first = size * (skipped + k * size)
-                block = values[:, first : first + size * size].reshape(-1, size, size)
-                rows.append(np.broadcast_to(template.rows[:, :, None], block.shape).ravel())
-                columns.append(np.broadcast_to(states[:, None, :], block.shape).ravel())
-                entries.append(block.ravel())
-        triplets = (np.concatenate(entries), (np.concatenate(rows), np.concatenate(columns)))
-        return sparse.csc_array(sparse.coo_array(triplets, shape=(self.dimension, self.dimension)))
+    def _assemble(self, templates: tuple[TemplateFunction, ...], state: np.ndarray) -> sparse.csc_array:
+        """Add the entries of templates into a matrix."""
+        entries = np.concatenate([each.evaluate(each.entries, state).ravel() for each in templates])
+        rows, columns = (np.concatenate([each.pattern[k].ravel() for each in templates]) for k in (0, 1))
+        return sparse.csc_array(sparse.coo_array((entries, (rows, columns)), shape=(self.dimension, self.dimension)))
 
 
 def term_size(e: sp.Expr, states: frozenset[sp.Symbol]) -> sp.Expr:
@@ -142,48 +181,49 @@ def term_size(e: sp.Expr, states: frozenset[sp.Symbol]) -> sp.Expr:
     return size
 
 
-def _node_templates(equations: Equations, values: Mapping[str, float]) -> Iterator[TermTemplate]:
+def _slopes(template: TermTemplate) -> list[Block]:
+    """Return the derivatives of the rates by the states of each array of indices."""
+    size = len(template.rates)
+    groups = [template.states[k : k + size] for k in range(0, len(template.states), size)]
+    return [tuple(tuple(derivative(e, s) for s in group) for e in template.rates) for group in groups]
+
+
+def _node_templates(equations: Equations) -> Iterator[TermTemplate]:
     """Yield the template of each kind of nodes."""
     for kind, node in enumerate(equations.nodes):
         nodes = [i for i, k in enumerate(equations.kind_of) if k == kind]
         states = np.array([equations.places[i] for i in nodes])
-        parameters = [_at_nodes(equations, values, s.name, nodes) for s in node.parameters]
+        parameters = [_at_nodes(equations, s.name, nodes) for s in node.parameters]
         size = len(node.state)
         inertia = node.inertia or tuple(tuple(sp.Integer(int(i == j)) for j in range(size)) for i in range(size))
-        symbols = [*node.state, *node.parameters]
-        yield TermTemplate(symbols, node.rhs, [node.jacobian()], [inertia], (states,), parameters)
+        yield TermTemplate([*node.state], [*node.parameters], node.rhs, [inertia], (states,), parameters)
 
 
-def _link_templates(equations: Equations, values: Mapping[str, float]) -> Iterator[TermTemplate]:
+def _link_templates(equations: Equations) -> Iterator[TermTemplate]:
     """Yield the template of the links of each layer between each two kinds."""
     for layer in equations.layers:
         for ends, edge in layer.edge_of:
             links = [link for link in layer.links if equations.ends(link) == ends]
             if links:
-                yield _link_template(equations, values, layer, edge, links)
+                yield _link_template(equations, layer, edge, links)
 
 
-def _link_template(
-    equations: Equations, values: Mapping[str, float], layer: Layer, edge: Edge, links: list[Link]
-) -> TermTemplate:
+def _link_template(equations: Equations, layer: Layer, edge: Edge, links: list[Link]) -> TermTemplate:
     """Return the template of some links of a layer."""
     targets, sources = [i for i, _, _ in links], [j for _, j, _ in links]
-    states = tuple(np.array([equations.places[i] for i in nodes]) for nodes in (targets, sources))
+    places = equations.places
+    states = tuple(np.array([places[i] for i in nodes]) for nodes in (targets, sources))
     # Parameters: the weight; those of the link, where the layer varies them, else of the target; those of the source.
-    parameters: list[float | np.ndarray] = [np.array([float(weight) for _, _, weight in links])]
+    parameters: list[Parameter] = [np.array([float(weight) for _, _, weight in links])]
     for s in edge.parameters:
-        if s.name in layer.varied:
-            parameters.append(np.array([values[layer.name(s.name, link)] for link in links]))
-        else:
-            parameters.append(_at_nodes(equations, values, s.name, targets))
-    parameters += [_at_nodes(equations, values, of.name, sources) for _, of in edge.theirs]
-    symbols = [*edge.here, *edge.there, edge.weight, *edge.parameters, *(s for s, _ in edge.theirs)]
-    slopes = [edge.jacobian_here(), edge.jacobian_there()]
-    return TermTemplate(symbols, edge.rhs, slopes, list(edge.inertia), states, parameters)
+        varies = s.name in layer.varied
+        names = tuple(layer.name(s.name, link) for link in links) if varies else _at_nodes(equations, s.name, targets)
+        parameters.append(names)
+    parameters += [_at_nodes(equations, of.name, sources) for _, of in edge.theirs]
+    others = [edge.weight, *edge.parameters, *(s for s, _ in edge.theirs)]
+    return TermTemplate([*edge.here, *edge.there], others, edge.rhs, list(edge.inertia), states, parameters)
 
 
-def _at_nodes(equations: Equations, values: Mapping[str, float], name: str, nodes: list[int]) -> float | np.ndarray:
-    """Return the value of a parameter: one for all, or that of each node if it varies between nodes."""
-    if name not in equations.varied:
-        return values[name]
-    return np.array([values[str(NodeName(name, i))] for i in nodes])
+def _at_nodes(equations: Equations, name: str, nodes: list[int]) -> Parameter:
+    """Return the name of a parameter, or its names at some nodes if it varies between nodes."""
+    return tuple(str(NodeName(name, i)) for i in nodes) if name in equations.varied else name
