@@ -18,7 +18,7 @@ import numpy as np
 from synchain.codegen.driver.columns import Control, SpanColumn
 from synchain.codegen.integrators import Integrator
 from synchain.codegen.kernels.observable_functions import SYNC_ERROR, Recording
-from synchain.codegen.kernels.sweep_kernel import SweepKernel, emit
+from synchain.codegen.kernels.sweep_kernel import LARGEST_UNROLLED, SweepKernel, emit
 from synchain.codegen.machine_code.compile import Kernel, load
 from synchain.codegen.machine_code.installation import InstallationError
 from synchain.codegen.machine_code.processor import processor, told_apart
@@ -160,10 +160,11 @@ class RowsSpec:
     control: np.ndarray  # (len(Control),)
     # the synchronisation error is recorded, unless all oscillators are stepped as one; a scene may have a stop
     recording: Recording = SYNC_ERROR
+    unroll: int = LARGEST_UNROLLED  # most nodes of a step that is written out
 
     def source(self, width: int | None = None) -> SweepKernel:
         """Return the text of the kernel."""
-        return emit(self.equations, self.integrator, self.recording, width)
+        return emit(self.equations, self.integrator, self.recording, width, unroll=self.unroll)
 
     def job(self, spec: JobSpec, kernel: Kernel) -> RowsJob:
         """Return the job that runs the kernel."""

@@ -1,0 +1,193 @@
+"""Networks that carry deviations or parameter derivatives: templates are differentiated, not the whole network.
+
+The derivative of a template by a parameter is a template again, and so is the pair (state, deviation).  Both functions
+of this module therefore return networks of any size at the cost of one node and one link, and every kernel runs them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, count
+
+import sympy as sp
+
+from ..inputs.names import LinkName, NodeName
+from ..mechanics import calculus
+from ..mechanics.components import Block, Edge, Node
+from .equations import Ends, Equations, Layer
+from .variational import expect_continuous
+
+Along = tuple[tuple[sp.Symbol, sp.Symbol], ...]
+"""Pairs of a state or parameter and its deviation."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lift:
+    """A network of nodes (x, d), where d is a small deviation from the motion x."""
+
+    equations: Equations
+    states: tuple[int, ...]  # index in the state of `equations` of each state of the original network
+    deviations: tuple[int, ...]  # index of the deviation of each state of the original network
+    seeds: Mapping[str, str]  # parameter of the original network: its deviation, a parameter of `equations`
+
+
+def lifted(equations: Equations, names: Iterable[str] = ()) -> Lift:
+    """Return the network of nodes (x, d) with d' = r_x d + sum_p seed_p r_p over some parameters p.
+
+    `seed_p` = 1 makes d the derivative of x by p. With a mass matrix, M x' = r, the second equation is
+    M d' + (M_x d + sum_p seed_p M_p) x' = r_x d + sum_p seed_p r_p. `names` may hold parameters of one node or one
+    link: P_2, k_1_2.
+    """
+    _check(equations)
+    bases = {name: _holder(equations, name)[0] for name in names}
+    # The deviation of x is d_x, that of p seed_p. A network that is lifted twice has these names: take d2_x, seed2_p.
+    taken = {s.name for node in equations.nodes for s in (*node.state, *node.parameters)}
+    taken |= {s.name for edge in equations.edges for s in edge.parameters}
+    rank = next(
+        k for k in chain([""], map(str, count(2))) if not any(n.startswith((f"d{k}_", f"seed{k}_")) for n in taken)
+    )
+
+    def deviations(symbols: Iterable[sp.Symbol], kind: str = "d") -> tuple[sp.Symbol, ...]:
+        return tuple(sp.Symbol(f"{kind}{rank}_{s.name}", real=True) for s in symbols)
+
+    def seeded(parameters: Iterable[sp.Symbol]) -> tuple[sp.Symbol, ...]:
+        return tuple(s for s in parameters if s.name in bases.values())
+
+    def node(each: Node) -> Node:
+        states, parameters = deviations(each.state), seeded(each.parameters)
+        seeds = deviations(parameters, "seed")
+        along = (*zip(each.state, states, strict=True), *zip(parameters, seeds, strict=True))
+        rates = (*each.rhs, *_changes(each.rhs, along))
+        inertia = _lower_triangular(each.inertia, along) if each.inertia else ()
+        return Node((*each.state, *states), rates, (*each.parameters, *seeds), inertia=inertia)
+
+    def edge(each: Edge) -> Edge:
+        here, there, parameters = deviations(each.here), deviations(each.there), seeded(each.parameters)
+        seeds = deviations(parameters, "seed")
+        # A parameter of the source has a symbol of the link's; its seed as well.
+        theirs = tuple((s, of) for s, of in each.theirs if of.name in bases.values())
+        source_seeds = deviations((s for s, _ in theirs), "seed")
+        along = (
+            *zip((*each.here, *each.there), (*here, *there), strict=True),
+            *zip(parameters, seeds, strict=True),
+            *zip((s for s, _ in theirs), source_seeds, strict=True),
+        )
+        return replace(
+            each,
+            here=(*each.here, *here),
+            there=(*each.there, *there),
+            rhs=(*each.rhs, *_changes(each.rhs, along)),
+            parameters=(*each.parameters, *seeds),
+            inertia=tuple(_lower_triangular(block, along) for block in each.inertia),
+            theirs=(*each.theirs, *zip(source_seeds, deviations((of for _, of in theirs), "seed"), strict=True)),
+        )
+
+    # Seeds of parameters with a value for each node or link have one as well. `Equations.map_templates` would check the
+    # templates before that is known.
+    seeds = {base: f"seed{rank}_{base}" for base in bases.values()}
+
+    def with_seeds(varied: tuple[str, ...]) -> tuple[str, ...]:
+        return (*varied, *(seeds[name] for name in varied if name in seeds))
+
+    def layer(each: Layer) -> Layer:
+        edge_of = tuple((ends, edge(template)) for ends, template in each.edge_of)
+        return replace(each, edge_of=edge_of, varied=with_seeds(each.varied))
+
+    both = replace(
+        equations,
+        nodes=tuple(map(node, equations.nodes)),
+        layers=tuple(map(layer, equations.layers)),
+        varied=with_seeds(equations.varied),
+    )
+    index = {name: k for k, name in enumerate(both.state)}
+    return Lift(
+        both,
+        tuple(index[name] for name in equations.state),
+        tuple(index[f"d{rank}_{name}"] for name in equations.state),
+        {name: f"seed{rank}_{name}" for name in bases},
+    )
+
+
+def derivative(equations: Equations, name: str) -> Equations:
+    """Return the network whose rates, and whose mass matrix if it has one, are the derivatives by a parameter.
+
+    The state and the parameters stay the same. `name` may be a parameter of one node or one link: P_2, k_1_2.
+    """
+    _check(equations)
+    base, holder = _holder(equations, name)
+    symbol = sp.Symbol(base, real=True)
+
+    def node(each: Node, acts: bool) -> Node:
+        size = len(each.state)
+        inertia = each.inertia or (((sp.S.Zero,) * size,) * size if equations.inertial else ())
+        by = symbol if acts else sp.Dummy(real=True)
+        inertia = tuple(tuple(calculus.derivative(e, by) for e in row) for row in inertia)
+        return Node(each.state, tuple(calculus.derivative(e, by) for e in each.rhs), each.parameters, inertia=inertia)
+
+    def edge(each: Edge, of_target: bool, of_source: bool) -> Edge:
+        symbols = [symbol] if of_target else []
+        symbols += [s for s, of in each.theirs if of == symbol] if of_source else []
+        along = tuple((s, sp.S.One) for s in symbols)
+        inertia = tuple(tuple(_changes(row, along) for row in block) for block in each.inertia)
+        return replace(each, rhs=_changes(each.rhs, along), inertia=inertia)
+
+    if isinstance(holder, LinkName):  # the links of that name alone
+        layer = equations.numbered[base]
+        acting = tuple(each for each in layer.links if layer.name(base, each) == name)
+        layers: tuple[Layer, ...] = (replace(layer.map(lambda e: edge(e, True, False)), links=acting),)
+        return replace(equations, nodes=tuple(node(each, False) for each in equations.nodes), layers=layers)
+    if holder is None:
+        return equations.map_templates(lambda each: node(each, True), lambda each: edge(each, True, True))
+    # One node: its template becomes a kind of its own, beside the kinds of all others.
+    kind, last = equations.kind_of[holder.index], len(equations.nodes)
+    kind_of = (*equations.kind_of[: holder.index], last, *equations.kind_of[holder.index + 1 :])
+    nodes = (*(node(each, False) for each in equations.nodes), node(equations.nodes[kind], True))
+    present = [k for k in range(last + 1) if k in kind_of]  # the node may have been the only one of its kind
+    renamed = {k: present.index(k) for k in present}
+
+    def split(pairs: Iterable[tuple[Ends, Edge]]) -> Iterator[tuple[Ends, Edge]]:
+        for (target, source), each in pairs:
+            for t in (target, last) if target == kind else (target,):
+                for s in (source, last) if source == kind else (source,):
+                    if t in renamed and s in renamed:
+                        yield (renamed[t], renamed[s]), edge(each, t == last, s == last)
+
+    listed = equations.without_fields()
+    return replace(
+        listed,
+        nodes=tuple(nodes[k] for k in present),
+        kind_of=tuple(renamed[k] for k in kind_of),
+        layers=tuple(replace(each, edge_of=tuple(split(each.edge_of))) for each in listed.layers),
+    )
+
+
+def _check(equations: Equations) -> None:
+    """Raise ValueError for rates that jump, whose derivatives do not describe small deviations."""
+    if equations.sticks:
+        raise ValueError(
+            "derivative of a network: found set-valued friction; expected smooth rates; use contact 'atan'"
+        )
+    expect_continuous(equations)
+
+
+def _holder(equations: Equations, name: str) -> tuple[str, NodeName | LinkName | None]:
+    """Return the symbol's name of a parameter, P of P_2, k of k_1_2, and its node or link if it belongs to one."""
+    if name not in equations.parameters:
+        raise ValueError(f"derivative of a network: found {name!r}; expected one of {', '.join(equations.parameters)}")
+    holder: NodeName | LinkName | None = None
+    if name in equations.single:
+        holder = LinkName.parse(name)
+        holder = holder if holder is not None and holder.base in equations.numbered else NodeName.parse(name)
+    return (name, None) if holder is None else (holder.base, holder)
+
+
+def _changes(expressions: Sequence[sp.Expr], along: Along) -> tuple[sp.Expr, ...]:
+    """Return the derivative of expressions along deviations of states and parameters."""
+    return tuple(sp.Add(*(calculus.derivative(e, s) * change for s, change in along)) for e in expressions)
+
+
+def _lower_triangular(block: Block, along: Along) -> Block:
+    """Return the block [[M, 0], [dM, M]] of a mass matrix, where dM is the derivative of M along deviations."""
+    zero = (sp.S.Zero,) * len(block[0])
+    return (*((*row, *zero) for row in block), *((*_changes(row, along), *row) for row in block))
