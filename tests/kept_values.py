@@ -100,7 +100,18 @@ def every_kind() -> dict[str, Labelled]:
             np.array([[["periodic"]]]),
             9.0,
         ),
-        Lyapunov(np.array([0.1, -np.inf]), np.array([0.01, 0.0]), np.array([True, False]), -3.0, 0.1, 50.0, 0.5, 2),
+        Lyapunov(
+            np.array([0.1, -np.inf]),
+            np.array([0.01, 0.0]),
+            np.array([True, False]),
+            np.array([25.0, 50.0]),
+            np.array([[0.2, -np.inf], [0.1, -np.inf]]),
+            -3.0,
+            0.1,
+            50.0,
+            0.5,
+            2,
+        ),
         ClusterExponents(
             state, np.array([-0.1]), np.array([0.01]), 0.0, 0.01, np.array([[0.0, 0.5], [0.5, 0.0]]), 20.0
         ),

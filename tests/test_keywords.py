@@ -377,8 +377,7 @@ OBEYED: dict[str, Any] = {
 RECORDED: dict[str, Any] = {
     "title": "another",
     "record": ("trajectory",),
-    "samples": None,
-    "t_eval": [5.5, 6.0, 6.9],
+    "samples": 7,
     "observe": {"e": "mean(x_1)"},
     "section": "v_1 rising",
     "sections": {"passed": {"function": "x_1"}},

@@ -19,6 +19,7 @@ from .clock_slots import *
 from .contacts import change_modes, note_rush, take_back
 from .control import accept_series, advance, aim, arrive, judge, pause, wrap
 from .dense import inside
+from .frames import GONE, LENGTHS, NEXT, PARTS, PRODUCTS, SHIFT, VOLUMES, close_block, drain, orthogonalise
 from .landings import begin_leg, begin_products, bring, close_batch, hand_over, land, lay_out
 from .propagators import TILE, TO, apply, larger, scale, settle, tabulate
 from .records import *
@@ -79,6 +80,15 @@ def hand_back(modes, powers, registers, vectors, growth, parts):
             for c in range(parts):
                 value = modes[(parts * register + c) * LANES + lane]
                 vectors[c, k] = value / length if length != 0.0 else 0.0
+
+
+@njit(error_model="numpy")
+def drop(modes, powers, registers, parts):
+    """Set deviations to zero that have become too short for any tolerance."""
+    for register in range(registers):
+        short = load(powers, register, LANES) < GONE
+        for c in range(parts):
+            store(modes, parts * register + c, select(short, 0.0, load(modes, parts * register + c, LANES)))
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -177,6 +187,8 @@ def take_step(taken, carried, modes, orbit, dims, functions):
         taken += 1
         if taken % BETWEEN_SCALINGS == 0:
             scale(old, modes.powers, active, modes.owners.size)
+            if modes.framed:
+                drop(old, modes.powers, active, modes.owners.size)
     largest = advance(clock, y, t, t_new, accept, orbit.y_new, dims)
     if CONTACTS:
         for i in range(dims.nodes):
@@ -252,7 +264,7 @@ def load_strengths(strengths, places, modes, kinds):
 
 
 @njit(error_model="numpy", nogil=True, cache=True)
-def march(functions, dims, owners, first, last, inputs, deviations, outputs, propagation):
+def march(functions, dims, owners, first, last, inputs, deviations, outputs, propagation, framing):
     """Run the cells first … last-1, each an orbit with all modes.
 
     functions: those of a scene.  dims: the sizes of its arrays.  owners (mode): the contact that each component of a
@@ -275,12 +287,17 @@ def march(functions, dims, owners, first, last, inputs, deviations, outputs, pro
     integrated; where (nodes of panels): their places in registers.  Deviations are cut at landings then, not at the ends of
     blocks; every block of time they are moved to all strengths.
     tracks (cells, batches, any), or none: filled with the state and the deviations at the beginning of each batch.
+
+    frame: plan (4) and frame (4, count), see `frames`, or none.  The first `count` deviations of a single cell are made
+    orthogonal after each block; vectors are overwritten by the last ones.  gains (1, batches, count + 1) are filled with
+    the growth of the directions and of the volume over each batch.
     """
     # Python passes plain tuples, whose types Numba finds faster than those of records
     start, values, spans, control = inputs
     strengths, vectors, growth = deviations
     end, sums, counts = outputs
     batches, places, panel_rows, weights, moving, gains, misfits, leg_rows, shares, where, tracks = propagation
+    plan, frame = framing
     rows, panels = Rows(start, values, spans, control), Panels(panel_rows, address(weights, 0))
 
     # 1. Workspace of the orbit.
@@ -297,7 +314,7 @@ def march(functions, dims, owners, first, last, inputs, deviations, outputs, pro
 
     # 2. Workspace of the deviations, in registers.
     registers, parts, columns = growth.shape[1] // LANES, owners.size, places.shape[1]
-    stride, groups = registers * LANES, gains.shape[2] // LANES
+    stride, groups = registers * LANES, 0 if plan.size else gains.shape[2] // LANES
     sticks, room = leg_rows.shape[0] > 0, int(leg_rows[leg_rows.shape[0] - 1, TO]) * LANES if leg_rows.shape[0] else 0
     held = registers * (2 * parts + 2 + 2 * max(1, kinds) + columns * parts) + 3 * groups
     memory = aligned((held + parts * (1 + TILE * columns)) * LANES + 9 * room)
@@ -316,7 +333,7 @@ def march(functions, dims, owners, first, last, inputs, deviations, outputs, pro
     count = places.shape[0]
     few, left = (count + LANES - 1) // LANES, 1 if owners[0] >= 0 else 0
     tolerance = control[RTOL] * control[LOOSENESS]
-    modes = Modes(vectors, owners, tolerance, registers, few, powers, mode_strengths, node_strengths)
+    modes = Modes(vectors, owners, tolerance, plan.size > 0, registers, few, powers, mode_strengths, node_strengths)
     nodes = Propagators(table, exponents, stride, address(places, 0), count, columns, parts)
     legs = Legs(leg_rows, address(shares, 0), where, left, share, share_powers, fine, heights, work)
     load_strengths(strengths, places, modes, kinds)
@@ -341,6 +358,9 @@ def march(functions, dims, owners, first, last, inputs, deviations, outputs, pro
                 if begun:
                     renew(cell, spans, control, clock)
                 begun = True
+                if plan.size and plan[SHIFT] >= 0:
+                    y[size + plan[SHIFT]] = plan[NEXT] * spans[cell, 1]
+                    plan[NEXT] = (plan[NEXT] + 1) % plan[PARTS]
                 status, carried = run_block(
                     cell, carried, rows, misfits, modes, orbit, nodes, panels, travellers, legs, dims, functions
                 )
@@ -352,6 +372,16 @@ def march(functions, dims, owners, first, last, inputs, deviations, outputs, pro
                     if panel_rows.shape[0]:
                         error = apply_propagators(carried.old, modes, nodes, panels, travellers)
                         misfits[cell] = larger(misfits[cell], error)
+                if plan.size:
+                    hand_back(carried.old, powers, registers, vectors[cell], growth[cell], parts)
+                    directions = address(vectors, cell * parts * stride)
+                    lengths, products = (
+                        address(frame, LENGTHS * frame.shape[1]),
+                        address(frame, PRODUCTS * frame.shape[1]),
+                    )
+                    orthogonalise(directions, parts, stride, frame.shape[1], lengths, products)
+                    volume, whole = drain(y, size, plan[VOLUMES]), plan[VOLUMES] > 0 and frame.shape[1] == parts
+                    close_block(growth[cell], volume, whole, control, frame, gains[cell, batch])
                 if CONTACTS:  # noqa: SIM102
                     if carried.parted:
                         misfits[cell] = larger(misfits[cell], hand_over(panels, travellers, legs))
@@ -372,7 +402,7 @@ def march(functions, dims, owners, first, last, inputs, deviations, outputs, pro
                         )
                 settle(moved, lifts, groups, at, parts, kept, kept_powers, carried.parted)
         # 5. The end of the cell.
-        if not panel_rows.shape[0]:
+        if not panel_rows.shape[0] and not plan.size:
             hand_back(carried.old, powers, registers, vectors[cell], growth[cell], parts)
         for c in range(dims.dimension):
             end[cell, c] = y[c]

@@ -24,7 +24,7 @@ class Rows(NamedTuple):
 
     start: Any  # (cells, dimension)
     values: Any  # (cells, parameters)
-    spans: Any  # (cells, 8), columns `SpanColumn`
+    spans: Any  # (cells, 7), columns `SpanColumn`
     control: Any  # columns `Control`
 
 
@@ -92,6 +92,7 @@ class Modes(NamedTuple):
     vectors: Any  # (cells, parts, modes)
     owners: Any  # (parts): contact that a component is a velocity of, or -1
     tolerance: Any
+    framed: Any  # True if deviations are made orthogonal after each block
     registers: Any
     node_registers: Any
     powers: Any  # addresses from here: powers of two of the deviations, strengths of both kinds

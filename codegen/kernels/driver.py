@@ -80,8 +80,8 @@ class Driver:
         return "march" if self.kind is KernelKind.MODES else "drive"
 
     def grouped(self, arrays: Sequence[Any]) -> Iterator[tuple[Any, ...]]:
-        """Return the tuples that the entry takes: input, deviations if there are modes, output, propagation."""
-        ends = (0, 4, 7, 10, 21) if self.kind is KernelKind.MODES else (0, 4, 10)
+        """Return the tuples that the entry takes: input, deviations if there are modes, output, propagation, framing."""
+        ends = (0, 4, 7, 10, 21, 23) if self.kind is KernelKind.MODES else (0, 4, 10)
         return (tuple(arrays[first:last]) for first, last in pairwise(ends))
 
     @property
@@ -95,7 +95,7 @@ class Driver:
             "SERIES": self.series,
         }
         contacts, landings = (["contacts"], ["landings"]) if self.contacts else ([], [])
-        last = ["propagators", *landings, "modes"] if modes else ["spread", "sweep"]
+        last = ["propagators", *landings, "frames", "modes"] if modes else ["spread", "sweep"]
         pieces = (f"driver.{name}" for name in ("dense", "cells", "control", *contacts, *last))
         return _module(str(self), tuple(constants.items()), tuple(pieces))
 

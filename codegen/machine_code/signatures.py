@@ -56,7 +56,7 @@ def recorder_signatures(width: int) -> dict[str, Any]:
         "observe": types.void(mask, mask, step, *[ADDRESS] * 3, sizes),
         "cut": types.void(mask, step, ADDRESS, CELLS, COUNTS, CUBE, ADDRESS, MATRIX, sizes, function),
         "tally": types.void(INTEGER, step, ADDRESS, CELLS, MATRIX, ADDRESS, MATRIX, sizes, function),
-        "sample": types.void(INTEGER, lane, step, ADDRESS, CELLS, READ_ONLY, CUBE, VECTOR, sizes),
+        "sample": types.void(INTEGER, lane, step, ADDRESS, CELLS, READ_ONLY, CUBE, sizes),
     }
 
 
@@ -90,4 +90,5 @@ def _of_modes(driver: Driver) -> tuple[dict[str, Any], tuple[Any, ...], tuple[An
     deviations, outputs = (READ_ONLY, CUBE, MATRIX), (MATRIX, MATRIX, COUNTS)
     # batches, places, panels, weights, travellers, gains, misfits; legs, shares, where; tracks
     propagation = (CELLS, MATRIX, MATRIX, VECTOR, MATRIX, CUBE, VECTOR, MATRIX, VECTOR, VECTOR, CUBE)
-    return taken, (_sizes(ModeDimensions), CELLS), (deviations, outputs, propagation)
+    framing = (CELLS, MATRIX)  # plan, frame
+    return taken, (_sizes(ModeDimensions), CELLS), (deviations, outputs, propagation, framing)

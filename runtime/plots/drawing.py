@@ -145,13 +145,15 @@ def _(value: Spectrum, axes: Axes, **style: Any) -> Axes:
 
 @_draw.register
 def _(value: Lyapunov, axes: Axes, **style: Any) -> Axes:
-    number = np.arange(1, len(value.exponent) + 1)
+    """Draw the running averages of the exponents over the length of the average, and their errors at its end."""
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
-    axes.errorbar(number, finite(value.exponent), 2 * value.stderr, **line_style(style, color=BLUE, **DOTS))
-    axes.set(xlabel="number", ylabel="Lyapunov exponent per unit of time")
+    for running, last, error in zip(value.running.T, value.exponent, value.stderr, strict=True):
+        (line,) = axes.plot(value.lengths, finite(running), **line_style(style, linewidth=0.8))
+        dot = {"color": line.get_color(), "fmt": "o", "markersize": 2.0, "capsize": 2.0}
+        axes.errorbar(value.time, *finite(np.array([last, 2.0 * error])), **dot)
+    axes.set(xlabel="length of the average", ylabel="Lyapunov exponents per unit of time")
     lost = int((~value.resolved).sum())
-    note(axes, f"{lost} of {len(number)} decay too fast to be followed" if lost else "")
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    note(axes, f"{lost} of {len(value.exponent)} decay too fast to be followed" if lost else "")
     return axes
 
 

@@ -301,6 +301,12 @@ class Batches:
         """Return the growth (starts, m) per unit of time."""
         return np.asarray(np.sum(self.sums[: self.count], axis=0) / self.time)
 
+    def running(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return lengths (b,) of the first batches together, and the growth (b, starts, m) per unit of time in them."""
+        blocks = np.minimum(np.arange(1, self.count + 1) * self.per_batch, self.blocks)
+        lengths = blocks * (self.block * self.unit)
+        return lengths, np.cumsum(self.sums[: self.count], axis=0) / lengths[:, None, None]
+
     def error_by_start(self) -> np.ndarray:
         """Return the standard error (starts, m) of each start; in 95 of 100 runs the truth is within two errors."""
         complete, frequencies = self.blocks // self.per_batch, self.frequencies

@@ -20,13 +20,14 @@ Source: Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15, 9 (1980).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 import sympy as sp
 import xarray as xr
 
+from synchain.codegen.driver.columns import Control
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.dynamics.variational import PHASE, Variation, network_variation, phase_shifted, with_volume
 from synchain.models.inputs.checks import check_integer
@@ -38,11 +39,10 @@ from ..support.error_text import with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .averages import TOLERANCE_RATIO, TRIED, Averaging, Batches, document_keywords, error_of_steps
-from .interpolation import Interpolation, Panel
 from .motion import rates_of
 from .orbits import LOOKS, OrbitProblem
 from .slow_motion import warn_of_slow_motion
-from .variational_integrator import Deviations, VariationalIntegrator
+from .variational_integrator import VariationalIntegrator
 
 __all__ = ["Lyapunov", "lyapunov_spectrum"]
 
@@ -55,19 +55,16 @@ ENOUGH = 64
 TRIAL = 4
 """Number of periods of each trial, and number of periods that are dropped after the choice."""
 
-CLEAR, LOST = 1e4, 10.0
-"""Lengths of a direction after a block, in units of rtol: a direction longer than CLEAR is resolved, one shorter than
-LOST
-is lost in the error (a choice)."""
-
-MOST_BLOCKS, FINE, FINEST = 32, 1e-7, 1e-10
-"""MOST_BLOCKS: most blocks between two orthogonalisations. FINE, FINEST: least angle between directions before an
-orthogonalisation, in trials and in averages."""
+CLEAR = 1e4
+"""A direction is resolved if it is longer than CLEAR rtol after a block (a choice)."""
 
 UNIT = 1024
 """Units of deviations are powers of UNIT. UNIT is a power of two, so that no digit is lost, and so large that
 components
 of usual sizes share one unit."""
+
+CALL = 8
+"""Number of periods of the transient in one call; growth without bound is seen from call to call (a choice)."""
 
 LOOKED = 2
 """Number of drive periods in which the extent of a motion is measured."""
@@ -77,9 +74,6 @@ LARGEST_RTOL = 1e-5
 
 ROUNDING = 1e-13
 """A direction of this length consists of rounding errors alone; only shorter blocks may resolve it."""
-
-GONE = 700.0
-"""A direction that shrinks by more than exp(-GONE) over a block is not integrated: numbers underflow at exp(-745)."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -98,6 +92,10 @@ class Lyapunov(Labelled):
     resolved : ndarray of bool, shape (count,)
         False for a direction that decays too fast to be followed, if there are several; its exponent is -inf. Its
         standard error is 0 under set-valued friction, where stick makes directions vanish, and nan otherwise.
+    lengths : ndarray, shape (k,)
+        Lengths of up to 64 parts of the average, from its beginning, in units of time; the last is `time`.
+    running : ndarray, shape (k, count)
+        Exponents of these parts, which show whether the average has converged.
     divergence : float
         Mean divergence along the orbit, which is the sum of all exponents of the network. Under
         set-valued friction, the computed exponents are added instead: the sum is -inf if an oscillator
@@ -117,6 +115,8 @@ class Lyapunov(Labelled):
     exponent: np.ndarray
     stderr: np.ndarray
     resolved: np.ndarray
+    lengths: np.ndarray
+    running: np.ndarray
     divergence: float
     divergence_error: float
     time: float
@@ -126,15 +126,16 @@ class Lyapunov(Labelled):
 
     @property
     def data(self) -> xr.Dataset:
-        """Exponents over their index, and the divergence."""
+        """Exponents over their index, also of parts of the average, and the divergence."""
         return dataset(
             {
                 "exponent": (("number",), self.exponent, "Lyapunov exponents per unit of time"),
                 "stderr": (("number",), self.stderr, "standard errors"),
                 "resolved": (("number",), self.resolved, "whether the direction could be followed"),
+                "running": (("length", "number"), self.running, "exponents of the first part of the average"),
                 "divergence": ((), self.divergence, "mean divergence along the orbit"),
             },
-            {"number": np.arange(1, len(self.exponent) + 1)},
+            {"number": np.arange(1, len(self.exponent) + 1), "length": self.lengths},
         )
 
     @property
@@ -254,16 +255,17 @@ def lyapunov_spectrum(
     averaging = averaging.in_units(scene, frame.unit)
     reporter.total = averaging.length
     with reporter:
-        for _ in range(round(averaging.transient)):
-            frame.advance()
-            reporter.advance(1)
+        for done in range(0, round(averaging.transient), CALL):
+            length = min(CALL, round(averaging.transient) - done)
+            frame.advance(np.array([length]))
+            reporter.advance(length)
         frame.choose_block()
-        frame.choose_group()
         batches, lost = Batches(frame.unit, 1.0 / frame.parts), np.zeros(frame.count, dtype=bool)
         for left in averaging.rounds(batches, lambda: batches.error()[:-1][~lost], reporter):
-            for growth, gone in frame.measure_group(min(frame.group, left)):
-                np.logical_or(lost, gone, out=lost)
-                batches.add(growth[None])
+            parts = batches.ahead(left)
+            growths, _, gone = frame.advance(parts)
+            np.logical_or(lost, gone, out=lost)
+            batches.extend(growths[:, None], parts)
         steps = frame.error_of_steps()
     orbit = frame.integrator
     warn_of_slow_motion(frame.variation.orbit, orbit.state, orbit.parameter_values[0], batches.time)
@@ -277,6 +279,7 @@ def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray, steps: np.n
     unknown = np.nan if frame.variation.events is None else 0.0
     exponent, spread = np.where(resolved, mean[:-1], -np.inf), np.where(resolved, error[:-1], unknown)
     order = np.argsort(-exponent, kind="stable")
+    lengths, running = batches.running()
     time, volume = batches.time, (float(mean[-1]), float(error[-1]))
     if frame.variation.events is not None:  # stick makes volumes zero: use the sum of all exponents
         complete = len(exponent) == frame.variation.size
@@ -285,6 +288,8 @@ def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray, steps: np.n
         exponent[order],
         spread[order],
         resolved[order],
+        lengths,
+        np.where(resolved, running[:, 0, :-1], -np.inf)[:, order],
         *volume,
         time=time,
         block=frame.unit / frame.parts,
@@ -299,23 +304,9 @@ class TangentFrame:
 
     problem: OrbitProblem  # network with the variational equation of all its states
     integrator: VariationalIntegrator  # integrator of the orbit and its deviations
-    basis: np.ndarray  # (size, count): orthonormal deviations
+    count: int  # number of deviations
     parts: int = 1  # blocks in a period
     phase: int = 0  # block within the period
-    group: int = 1  # number of blocks between two orthogonalisations
-    # integrator of the propagator of the network, and the directions that the propagator multiplies; made at first use
-    carried: tuple[VariationalIntegrator, Deviations] | None = None
-    # function of states and parameters that returns the matrix (size, size) of the variational equation at time 0
-    matrix: Callable[..., np.ndarray] = field(init=False)
-
-    def __post_init__(self) -> None:
-        orbit, size = self.variation.orbit, self.variation.size
-        table = sp.zeros(size, size)
-        for (row, column), e in self.variation.matrix:
-            table[row, column] = e.xreplace({sp.Symbol("t", real=True): sp.S.Zero})
-        self.matrix = sp.lambdify(
-            [sp.Symbol(name, real=True) for name in (*orbit.state, *orbit.parameters)], table, "numpy"
-        )
 
     @classmethod
     def make(cls, scene: Scene, count: int, seed: int) -> TangentFrame:
@@ -329,14 +320,13 @@ class TangentFrame:
         start = np.array([[*scene.y0, *(0.0 for _ in range(hidden))]])
         problem = OrbitProblem.of(scene, variation, np.zeros((count, 0)), start)
         state = problem.with_slip_states(start)
-        basis = np.linalg.qr(np.random.default_rng(seed).normal(size=(network.size, count)))[0]
 
         # measure the extent of the motion; in units of the extent, all components of a deviation have similar sizes
         if problem.forced:
-            first = cls(problem, problem.integrator(state), basis, parts=LOOKS)
-            states = [first.integrator.state[0]]
+            first = cls.begin(problem, state, count, seed)
+            first.parts, states = LOOKS, [state[0]]
             for _ in range(LOOKED * LOOKS):
-                first.advance()
+                first.advance(np.ones(1, dtype=np.int64))
                 states.append(first.integrator.state[0])
             turns = problem.turns._replace(extent=np.ptp(states, axis=0)[: len(states[0]) - hidden])
         else:
@@ -345,7 +335,15 @@ class TangentFrame:
         if not sticks:
             problem = replace(problem, variation=_scaled(variation, turns.extent))
         problem = problem.with_turns(turns, start)
-        return cls(problem, problem.integrator(state), basis)
+        return cls.begin(problem, state, count, seed)
+
+    @classmethod
+    def begin(cls, problem: OrbitProblem, state: np.ndarray, count: int, seed: int) -> TangentFrame:
+        """Return a frame at a state (1, components), with random orthonormal directions."""
+        integrator, size = problem.integrator(state), problem.variation.size
+        integrator.vectors[:] = 0.0  # also in the lanes behind the last direction
+        integrator.vectors[0, :, :count] = np.linalg.qr(np.random.default_rng(seed).normal(size=(size, count)))[0]
+        return cls(problem, integrator, count)
 
     @property
     def variation(self) -> Variation:
@@ -358,160 +356,34 @@ class TangentFrame:
         return self.problem.unit
 
     @property
-    def volumes(self) -> int:
-        """Number of states, at the end of the state, that are logarithms of volumes."""
-        return 0 if self.variation.events is not None else self.problem.scene.n
-
-    @property
-    def count(self) -> int:
-        """Number of deviations."""
-        return int(self.basis.shape[1])
-
-    @property
     def rtol(self) -> float:
         """Relative tolerance of the integration."""
-        return float(self.integrator.control[0])
+        return float(self.integrator.control[Control.RTOL])
 
-    def advance(self) -> tuple[np.ndarray, np.ndarray, float]:
-        """Advance by one block; return growth (count,), remaining length (count,), and the growth of the volume.
+    def advance(self, batches: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Advance by batches (b,) of blocks; return growths (b, count + 1), least lengths (count,), lost (count,).
 
-        The remaining length is the length of a direction after the block, before normalisation, at most 1.
+        The last column of the growths is that of the volume. The least length of a direction is that at the end of a
+        block, before normalisation, at most 1. A direction is lost if it is shorter than the error after a block.
         """
-        self._set_clock()
-        self.phase = (self.phase + 1) % self.parts
-        followed = self.followed()
-        self.integrator.set_deviations(np.where(np.arange(self.count) < followed, self.basis, 0.0)[None])
-        factors = self.integrator.advance(self.unit / self.parts)[
-            0
-        ]  # logarithms of those that deviations are divided by
-        ends = self.integrator.deviations[0]
-        ends[:, followed:] = self.basis[:, followed:]
-        self.basis, triangle = np.linalg.qr(ends)
-        lengths = np.abs(np.diagonal(triangle))
-        volume = np.nan
-        if self.volumes:
-            shares = self.integrator.state[:, -self.volumes :]
-            volume = float(shares.sum())
-            shares[:] = 0.0
-        with np.errstate(divide="ignore"):
-            return factors + np.log(lengths), lengths * np.exp(np.minimum(factors, 0.0)), volume
-
-    def _set_clock(self) -> None:
-        """Set the clock of the equations to the phase of the drive at which the next block begins."""
-        names = self.variation.orbit.parameters
-        if PHASE.name in names:
-            self.integrator.parameter_values[:, names.index(PHASE.name)] = self.phase * (self.unit / self.parts)
-
-    def followed(self) -> int:
-        """Return the number of directions that are integrated over the next block.
-
-        Directions that vanish long before the end of the block are not integrated: with a relative tolerance, the
-        integrator would resolve every decade of their decay.
-        """
-        matrix = self.matrix(*self.integrator.state[0], *self.integrator.parameter_values[0])
-        length = self.unit / self.parts
-        if not GONE < np.abs(matrix).sum(axis=1).max() * length < math.inf:
-            return self.count
-        decay = np.sort(np.linalg.eigvals(matrix).real)[::-1][: self.count]
-        return int((decay * length > -GONE).sum())
-
-    def measure(self) -> tuple[np.ndarray, np.ndarray]:
-        """Advance by one block.
-
-        Return the growth (count + 1,) of the directions and of the volume, and whether each direction is lost (count,).
-        """
-        growth, share, volume = self.advance()
-        lost = share < LOST * self.rtol
-        if lost.sum() == 1 and self.count == self.variation.size and self.variation.events is None:
-            growth[lost], lost = volume - growth[~lost].sum(), np.zeros_like(lost)
-        return np.append(np.where(np.isfinite(growth), growth, 0.0), volume), lost
-
-    def measure_group(self, blocks: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Advance by several blocks.
-
-        Yield the growth and the lost directions of each block, as `measure` returns them.
-        """
-        begun, basis = self.integrator.state, self.basis
-        if blocks > 1:
-            growths, angles, volumes = self.advance_group(blocks)
-            shares = growths - np.maximum(growths.max(axis=1, keepdims=True), 0.0)
-            # accept the blocks if all directions stay apart and above the error; else repeat the blocks one by one
-            if angles.min() > FINEST and shares.min() > math.log(LOST * self.rtol):
-                yield from zip(np.column_stack([growths, volumes]), np.zeros(growths.shape, dtype=bool), strict=True)
-                return
-            self.integrator.state, self.basis = begun, basis
-        yield from (self.measure() for _ in range(blocks))
-
-    def advance_group(self, blocks: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Advance by several blocks in one call; make the directions orthogonal only at the end.
-
-        The propagator of each block multiplies the directions, and is as exact as the steps.
-        Shapes: returns growths (blocks, count), angles (blocks, count), volumes (blocks,).
-        """
-        size, count = self.variation.size, self.count
-        carrier, deviations = self.carried = self.carried or self._carriers()
-        self._set_clock()
-        carrier.state, carrier.parameter_values = self.integrator.state, self.integrator.parameter_values
-        carrier.set_deviations(np.eye(size)[None])
-        # fill the lanes of the registers (registers, size, lanes) with the directions; repeat them in spare lanes
-        lanes = deviations.registers.lanes
-        registers = deviations.vectors.reshape(-1, size, lanes)
-        directions = np.resize(self.basis.T, (len(registers) * lanes, size))
-        registers[:] = directions.reshape(-1, lanes, size).swapaxes(1, 2)
-        states = carrier.state.shape[1]
-        batch_starts = np.empty((1, blocks, states + registers.size))
-        single = np.ones(blocks, dtype=np.int64)
-        log_growth = carrier.follow(self.unit / self.parts, single, deviations, batch_starts)[:, 0]
-        # compute the growth of the orthogonalised directions up to each block, and the change over each block
-        ends = np.concatenate([batch_starts[0, 1:, states:].reshape(-1, *registers.shape), registers[None]])
-        moved = ends.swapaxes(2, 3).reshape(blocks, -1, size)[:, :count].swapaxes(1, 2)
-        bases, triangles = np.linalg.qr(moved)
-        self.basis, angles = bases[-1], np.abs(np.diagonal(triangles, axis1=1, axis2=2))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            growths = np.diff(np.cumsum(log_growth, axis=0) + np.log(angles), axis=0, prepend=0.0)
-        volumes = np.full(blocks, np.nan)
-        if self.volumes:
-            passed = [*batch_starts[0, :, states - self.volumes : states], carrier.state[0, -self.volumes :]]
-            volumes = np.diff(np.sum(passed, axis=1))
-            carrier.state[:, -self.volumes :] = 0.0
-        self.integrator.state = carrier.state
-        return growths, angles, volumes
-
-    def _carriers(self) -> tuple[VariationalIntegrator, Deviations]:
-        """Return an integrator of the propagator of the network, and the directions that the propagator multiplies."""
-        size, count, frame = self.variation.size, self.count, self.integrator
-        carrier = frame
-        if count < size:
-            carrier = self.problem.integrator(frame.state, np.zeros((size, 0)))
-            carrier.control, carrier.watch = frame.control, frame.watch
-        shared = Panel(np.arange(count), np.zeros(1), np.zeros(0), np.ones((count, 1)), np.zeros((0, 1)))
-        registers = Interpolation(np.zeros(count), (shared,)).registers(frame.kernel.origin.width)
-        return carrier, Deviations.make(registers, 1, size, size)
-
-    def choose_group(self) -> None:
-        """Choose the largest number of blocks between two orthogonalisations that keeps the directions apart."""
-        self.group = 1
-        phased = PHASE.name in self.variation.orbit.parameters and self.parts > 1
-        if phased or self.followed() < self.count:
-            return
-        begun, basis = self.integrator.state, self.basis
-        growths, angles, _ = self.advance_group(MOST_BLOCKS)
-        self.integrator.state, self.basis = begun, basis
-        with np.errstate(invalid="ignore"):
-            shares = growths - growths.max(axis=1, keepdims=True)
-        clear = np.all((angles > FINE) & (shares > math.log(CLEAR * self.rtol)), axis=1)
-        while 2 * self.group <= MOST_BLOCKS and clear[: 2 * self.group].all():
-            self.group *= 2
+        names, frame = self.variation.orbit.parameters, np.zeros((4, self.count))
+        shift = names.index(PHASE.name) if PHASE.name in names else -1
+        volumes = 0 if self.variation.events is not None else self.problem.scene.n
+        frame[0] = np.inf
+        plan = np.array([self.parts, self.phase, shift, volumes])
+        growths = self.integrator.orthogonal(self.unit / self.parts, batches, plan, frame)
+        self.phase = int(plan[1])
+        return growths, frame[0], frame[1] > 0.0
 
     def error_of_steps(self) -> np.ndarray:
         """Advance by TRIED periods; return the error of all growth rates (count + 1,) due to the steps."""
-        usual, looser = [], []
+        usual, looser, single = [], [], np.ones(1, dtype=np.int64)
         for _ in range(TRIED * self.parts):
-            basis, phase = self.basis, self.phase
+            phase = self.phase
             with self.integrator.loosened(TOLERANCE_RATIO):
-                looser.append(self.measure()[0])
-            self.basis, self.phase = basis, phase
-            usual.append(self.measure()[0])
+                looser.append(self.advance(single)[0][0])
+            self.phase = phase
+            usual.append(self.advance(single)[0][0])
         return error_of_steps(usual, looser, self.unit / self.parts)
 
     def choose_block(self) -> None:
@@ -520,16 +392,14 @@ class TangentFrame:
         for parts in PARTS:
             self.parts, self.phase = parts, 0
             # a direction counts as resolved if it and all directions before it are longer than the error in every block
-            shares = np.array([self.advance()[1] for _ in range(TRIAL * parts)])
-            least = shares.min(axis=0)
+            _, least, _ = self.advance(np.array([TRIAL * parts]))
             clear = np.logical_and.accumulate(least > CLEAR * self.rtol)
             if clear.sum() > best:
                 best, fewest = int(clear.sum()), parts
             if best == self.count or (parts >= ENOUGH and least[best] < ROUNDING):
                 break
         self.parts, self.phase = fewest, 0
-        for _ in range(TRIAL * fewest):
-            self.advance()
+        self.advance(np.array([TRIAL * fewest]))
 
 
 def _scaled(variation: Variation, extent: np.ndarray) -> Variation:

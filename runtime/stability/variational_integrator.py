@@ -48,6 +48,9 @@ NO_PANELS = (
 )
 """The last arguments of a kernel that integrates deviations over one block, without interpolation."""
 
+NO_FRAME = (np.zeros(0, dtype=np.int64), np.zeros((0, 0)))
+"""Arguments for deviations that stay as they are at the ends of blocks."""
+
 NO_STICK_INTERVALS, NO_BATCH_STARTS = NO_PANELS[-4:-1], NO_PANELS[-1]
 """Arguments for propagators that are integrated over whole blocks, and for starts of batches that are not recorded."""
 
@@ -228,6 +231,17 @@ class VariationalIntegrator:
         deviations.error = float(np.maximum(deviations.error, interpolation_errors.max()))  # a NaN remains
         return registers.of_strengths(log_growth.transpose(1, 0, 2))
 
+    def orthogonal(self, length: float, batches: np.ndarray, plan: np.ndarray, frame: np.ndarray) -> np.ndarray:
+        """Integrate one orbit over successive blocks of time, and make its deviations orthogonal after each block.
+
+        Shapes: batches (b,), plan (4,) and frame (4, count) as in `codegen.driver.frames`; returns the growth
+        (b, count + 1) of the directions and of the volume over each batch.
+        """
+        growths = np.zeros((1, len(batches), frame.shape[1] + 1))
+        panels = (batches, *NO_PANELS[1:5], growths, *NO_PANELS[6:])
+        self._run(length, panels, self.vectors, np.empty((1, self.strengths.shape[1])), (plan, frame))
+        return np.asarray(growths[0])
+
     def loosen(self, ratio: float) -> None:
         """Multiply the tolerances by a ratio."""
         self.control[[Control.RTOL, Control.ATOL]] *= ratio
@@ -268,7 +282,12 @@ class VariationalIntegrator:
         return error_of_steps(usual, looser, length)
 
     def _run(
-        self, length: float | np.ndarray, panels: tuple[np.ndarray, ...], vectors: np.ndarray, growth: np.ndarray
+        self,
+        length: float | np.ndarray,
+        panels: tuple[np.ndarray, ...],
+        vectors: np.ndarray,
+        growth: np.ndarray,
+        framing: tuple[np.ndarray, np.ndarray] = NO_FRAME,
     ) -> None:
         """Run the kernel for all cells, and store the states at the end."""
         cells, dimension = self.state.shape
@@ -276,7 +295,7 @@ class VariationalIntegrator:
         cell_times[:, SpanColumn.END], cell_times[:, SpanColumn.PERIOD] = length, self.period
         end, sums, counts = np.empty((cells, dimension)), np.empty((cells, 4)), np.zeros((cells, 6), dtype=np.int64)
         before = (self.state, self.parameter_values, cell_times, self.control, self.strengths)
-        arguments = (*before, vectors, growth, end, sums, counts, *panels)
+        arguments = (*before, vectors, growth, end, sums, counts, *panels, *framing)
         if min(cells, self.workers) == 1:
             self.kernel.drive(0, cells, *arguments)
         else:

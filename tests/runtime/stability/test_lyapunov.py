@@ -20,6 +20,10 @@ APART = from_matrix([[1, -1], [-1, 1]])
 """A link of weight -1, which drives two oscillators apart: gamma = 2."""
 
 
+NO_PARTS = (np.zeros(0), np.zeros((0, 0)))
+"""No running averages."""
+
+
 def lone(name: str, **parameters: float) -> Scene:
     return Scene(oscillator=name, coupling=None, parameters=parameters)
 
@@ -40,6 +44,16 @@ def test_the_published_spectrum_of_lorenz(lorenz: Lyapunov) -> None:
     assert lorenz.stderr[0] < 0.01
     assert lorenz.dimension == pytest.approx(2.062, abs=2e-3)
     assert lorenz.resolved.all()
+
+
+def test_running_averages_end_at_the_exponents(lorenz: Lyapunov) -> None:
+    assert lorenz.lengths[-1] == lorenz.time
+    assert 32 <= len(lorenz.lengths) <= 64
+    np.testing.assert_allclose(lorenz.running[-1], lorenz.exponent, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(lorenz.running.sum(axis=1), -41 / 3, atol=1e-7)
+    assert np.ptp(lorenz.running[:, 0]) > 1e-3
+    lines = [line for line in lorenz.plot().get_lines() if len(line.get_xdata()) == len(lorenz.lengths)]
+    np.testing.assert_array_equal([line.get_ydata() for line in lines], lorenz.running.T)
 
 
 def test_the_published_spectrum_of_rossler(rossler: Lyapunov) -> None:
@@ -78,8 +92,8 @@ def test_blocks_of_a_part_of_a_period_see_the_drive_at_its_phase() -> None:
     for parts in (1, 8):
         frame = TangentFrame.make(lone("duffing", u=4.0), 2, seed=0)
         frame.parts = parts
-        growth = [frame.advance() for _ in range(5 * parts)]
-        spectra.append((frame.integrator.state[0], sum(g[0].sum() for g in growth), sum(g[2] for g in growth)))
+        growths, _, _ = frame.advance(np.full(5, parts))
+        spectra.append((frame.integrator.state[0], growths, frame.integrator.vectors[0, :, :2]))
     for whole_block, eighths in zip(*spectra, strict=True):
         np.testing.assert_allclose(eighths, whole_block, atol=1e-6)
 
@@ -139,14 +153,15 @@ def test_a_clock_set_later_shifts_equations_and_matrix() -> None:
 def test_dimension_by_hand() -> None:
     def of(*values: float, components: int = 3) -> float:
         expected = np.array(values)
-        return Lyapunov(expected, np.zeros(len(expected)), expected > -np.inf, 0.0, 0.0, 1.0, 1.0, components).dimension
+        zeros = np.zeros(len(expected))
+        return Lyapunov(expected, zeros, expected > -np.inf, *NO_PARTS, 0.0, 0.0, 1.0, 1.0, components).dimension
 
     assert of(1.0, 0.0, -2.0) == 2.5
     assert of(-1.0, -2.0, -3.0) == 0.0
     assert of(1.0, -np.inf, -np.inf) == 1.0
     assert of(1.0, 0.0, -1.0) == 3.0
     assert np.isnan(of(1.0, 0.0))
-    few = Lyapunov(np.array([1.0, 0.0]), np.zeros(2), np.ones(2, dtype=bool), 0.0, 0.0, 1.0, 1.0, 3)
+    few = Lyapunov(np.array([1.0, 0.0]), np.zeros(2), np.ones(2, dtype=bool), *NO_PARTS, 0.0, 0.0, 1.0, 1.0, 3)
     assert dict(few.summary)["Kaplan-Yorke dimension"] == "above 2"
 
 
@@ -164,7 +179,7 @@ def test_the_errors_of_exponents_are_those_of_the_dimension(
     exponents: tuple[float, ...], errors: tuple[float, ...], dimension: float, span: tuple[float, float]
 ) -> None:
     values = np.array(exponents), np.array(errors), np.ones(len(errors), dtype=bool)
-    result = Lyapunov(*values, 0.0, 0.0, 1.0, 1.0, len(errors))
+    result = Lyapunov(*values, *NO_PARTS, 0.0, 0.0, 1.0, 1.0, len(errors))
     assert result.dimension == pytest.approx(dimension, rel=1e-12)
     assert result.dimension_range == pytest.approx(span, rel=1e-12)
     assert dict(result.summary)["Kaplan-Yorke dimension"].startswith(f"{dimension:.4g}, from {span[0]:.4g} to ")
@@ -222,10 +237,21 @@ def test_the_absolute_tolerance_of_a_scene_counts() -> None:
     assert spectra[0] != spectra[1]
 
 
-def test_products_of_propagators_grow_as_single_blocks_do() -> None:
-    for scene, count in ((lone("lorenz"), 3), (lone("duffing", u=4.0), 1)):
-        frames = [TangentFrame.make(scene, count, seed=0) for _ in range(2)]
-        single = np.array([frames[0].measure()[0] for _ in range(4)])
-        group = np.array([growth for growth, _ in frames[1].measure_group(4)])
-        np.testing.assert_allclose(group, single, atol=1e-5)
-        np.testing.assert_allclose(np.abs(frames[1].basis), np.abs(frames[0].basis), atol=1e-5)
+def test_directions_are_those_of_householder_after_each_block() -> None:
+    """The same blocks with NumPy's `qr` between them."""
+    for scene, count in (
+        (lone("lorenz"), 3),
+        (lone("lorenz"), 2),
+        (Scene("duffing", topology=PAIR, parameters={"sigma": 0.2}), 4),
+    ):
+        frame, other = (TangentFrame.make(scene, count, seed=0) for _ in range(2))
+        growths, _, lost = frame.advance(np.ones(4, dtype=np.int64))
+        assert not lost.any()
+        for growth in growths:
+            before = other.integrator.state[0, -scene.n :].sum()
+            rates = other.integrator.advance(other.unit)[0, :count]
+            basis, triangle = np.linalg.qr(other.integrator.vectors[0, :, :count])
+            other.integrator.vectors[0, :, :count] = basis
+            np.testing.assert_allclose(growth[:-1], rates + np.log(np.abs(np.diagonal(triangle))), atol=1e-6)
+            assert growth[-1] == pytest.approx(other.integrator.state[0, -scene.n :].sum() - before, abs=1e-6)
+        np.testing.assert_allclose(np.abs(frame.integrator.vectors[0, :, :count]), np.abs(basis), atol=1e-5)
