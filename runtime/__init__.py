@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from .synchronisation.exponent_windows import ExponentWindows
     from .synchronisation.probe import Probe, universal_probe
     from .synchronisation.threshold import Thresholds, thresholds
+    from .synchronisation.transition import Transition, TransitionCheck, transition
 
 __all__ = [
     "MSF",
@@ -77,6 +78,8 @@ __all__ = [
     "SweepFailed",
     "SweepInterrupted",
     "Thresholds",
+    "Transition",
+    "TransitionCheck",
     "basin",
     "cluster_exponents",
     "equilibrium",
@@ -93,6 +96,7 @@ __all__ = [
     "skeleton",
     "stream",
     "thresholds",
+    "transition",
     "universal_probe",
 ]
 
@@ -117,6 +121,8 @@ _HOMES = {
     "SweepFailed": "sweeps.errors",
     "SweepInterrupted": "sweeps.errors",
     "Thresholds": "synchronisation.threshold",
+    "Transition": "synchronisation.transition",
+    "TransitionCheck": "synchronisation.transition",
     "basin": "synchronisation.basin",
     "cluster_exponents": "stability.cluster_exponents",
     "equilibrium": "bifurcation.equilibrium",
@@ -133,6 +139,7 @@ _HOMES = {
     "skeleton": "bifurcation.skeleton",
     "stream": "sweeps.stream",
     "thresholds": "synchronisation.threshold",
+    "transition": "synchronisation.transition",
     "universal_probe": "synchronisation.probe",
 }
 

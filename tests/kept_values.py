@@ -28,6 +28,7 @@ from synchain.runtime.synchronisation.criterion import PAPER
 from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
 from synchain.runtime.synchronisation.probe import Probe
 from synchain.runtime.synchronisation.threshold import Sweep, Thresholds
+from synchain.runtime.synchronisation.transition import Transition, TransitionCheck
 
 PAIR = Scene(topology=topology("chain", 2), parameters={"omega": 1.15})
 ROTORS = Scene(Field({"theta": "w"}, parameters={"w": 0.25}), "theta->theta", topology("chain", 2))
@@ -84,6 +85,11 @@ def thresholds() -> Thresholds:
     )
 
 
+def transition() -> Transition:
+    """Nodes that are together from strength 0 on, and part at 0.15."""
+    return Transition(MSF(PAIR, np.linspace(0.0, 1.0, 5), exponents_on(np.linspace(0.0, 1.0, 21))))
+
+
 def every_kind() -> dict[str, Labelled]:
     """One value of each kind, by the name of its class."""
     alpha = np.linspace(0.0, 1.0, 5)
@@ -132,5 +138,7 @@ def every_kind() -> dict[str, Labelled]:
             np.ones((5, 2), int),
         ),
         thresholds(),
+        transition(),
+        TransitionCheck(transition(), np.array([[0.2, 0.4]]), np.array([[-0.1, np.nan]]), np.ones((1, 2)), ("w",)),
     )
     return {type(value).__name__: value for value in values}

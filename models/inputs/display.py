@@ -123,7 +123,8 @@ class HasDrawing(HasHtml):
         ax : matplotlib axes, optional
             By default pyplot's current axes, or the axes of a new figure.
         values : array_like (n,), optional
-            Values that colour the nodes: whole numbers are classes, such as clusters; other numbers use a colour map.
+            Values that colour the nodes: whole numbers are classes, such as clusters, and a node alone in its class is grey;
+            other numbers use a colour map.
         **style
             Keywords of `matplotlib.axes.Axes.scatter` for the nodes, such as `cmap`, `vmin`, `s`.
 

@@ -109,6 +109,8 @@ from synchain.runtime import Streamed as Streamed
 from synchain.runtime import SweepFailed as SweepFailed
 from synchain.runtime import SweepInterrupted as SweepInterrupted
 from synchain.runtime import Thresholds as Thresholds
+from synchain.runtime import Transition as Transition
+from synchain.runtime import TransitionCheck as TransitionCheck
 from synchain.runtime import basin as basin
 from synchain.runtime import cluster_exponents as cluster_exponents
 from synchain.runtime import equilibrium as equilibrium
@@ -125,6 +127,7 @@ from synchain.runtime import run as run
 from synchain.runtime import skeleton as skeleton
 from synchain.runtime import stream as stream
 from synchain.runtime import thresholds as thresholds
+from synchain.runtime import transition as transition
 from synchain.runtime import universal_probe as universal_probe
 
 __version__: str

@@ -29,9 +29,11 @@ from ..sweeps.stream import Streamed
 from ..synchronisation.basin import Basin, Fate
 from ..synchronisation.probe import Probe
 from ..synchronisation.threshold import Thresholds
+from ..synchronisation.transition import Transition, TransitionCheck
 from .branch_marks import MARK, MARKERS, STABLE, UNSTABLE
 from .canvas import axes_of, check_style, line_style
 from .exponent import draw_exponent, finite
+from .graph_picture import ALONE, class_colours
 from .plane import draw_plane
 from .result_plot import draw_result
 from .style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, bands, note, symbol
@@ -281,4 +283,41 @@ def _(value: Probe, axes: Axes, **style: Any) -> Axes:
     )
     axes.set(xlabel=r"$\alpha$", ylabel=r"$\beta$")
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    return axes
+
+
+@_draw.register
+def _(value: Transition, axes: Axes, **style: Any) -> Axes:
+    """Draw a line for each node over the coupling strength, coloured by its cluster; grey bands are errors of steps."""
+    steps, labels = value.steps, value.scene.topology.labels
+    states = [value.first, *(step.classes for step in steps)]
+    # nodes that join early are neighbours: sort by the clusters of the last state first
+    order = sorted(range(len(labels)), key=lambda i: tuple(state[i] for state in reversed(states)))
+    height = {node: place for place, node in enumerate(order)}
+    ends = [0.0, *(step.strength for step in steps), value.highest]
+    for state, low, high in zip(states, ends[:-1], ends[1:], strict=True):
+        for node, colour in enumerate(class_colours(np.array(state))):
+            width = 1.0 if colour == ALONE else 5.0
+            look = line_style(style, color=colour, linewidth=width, solid_capstyle="butt")
+            axes.plot([low, high], [height[node]] * 2, **look)
+    for step in steps:
+        axes.axvline(step.strength, color=BLACK, linewidth=0.6)
+        if np.isfinite(step.error):
+            bands(axes, [(step.strength - step.error, step.strength + step.error)])
+    axes.set(xlabel=symbol(value.scene.strength), ylabel="node", xlim=(0.0, value.highest))
+    axes.set_yticks(range(len(order)), [str(labels[node]) for node in order])
+    return axes
+
+
+@_draw.register
+def _(value: TransitionCheck, axes: Axes, **style: Any) -> Axes:
+    """Draw the exponents of each step's state over the strength relative to the predicted one."""
+    axes.axhline(0.0, color=BLACK, linewidth=0.6)
+    axes.axvline(1.0, color=BLACK, linewidth=0.6)
+    for k, step in enumerate(value.transition.steps):
+        if np.isfinite(value.exponent[k]).all():
+            look = line_style(style, marker="o", label=f"step {k + 1}")
+            axes.errorbar(value.strength[k] / step.strength, value.exponent[k], 2 * value.stderr[k], **look)
+    axes.set(xlabel="strength / predicted strength", ylabel="exponent of the cluster state per unit of time")
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4)
     return axes

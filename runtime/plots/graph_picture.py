@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 """Colours of the kinds of nodes (Okabe & Ito)."""
 
+ALONE = "0.8"
+"""Colour of a node that is alone in its class."""
+
 NEGATIVE = "#D55E00"
 """Colour of links with a negative weight."""
 
@@ -189,8 +192,7 @@ def _nodes(axes: Axes, picture: Picture, values: ArrayLike | None, style: dict[s
         if colour.dtype.kind == "f":
             axes.figure.colorbar(axes.scatter(*points.T, **{"c": colour, **dots}), ax=axes)
         else:  # whole numbers are classes, such as clusters
-            classes = np.unique(colour, return_inverse=True)[1]
-            axes.scatter(*points.T, **{"color": [COLOURS[k % len(COLOURS)] for k in classes], **dots})
+            axes.scatter(*points.T, **{"color": class_colours(colour), **dots})
     if picture.radius >= NUMBERED:
         for i, (x, y) in enumerate(points.tolist()):
             axes.text(
@@ -209,6 +211,13 @@ def _nodes(axes: Axes, picture: Picture, values: ArrayLike | None, style: dict[s
     low, high = points.min(axis=0) - 0.2, points.max(axis=0) + 0.2
     axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.set_axis_off()
+
+
+def class_colours(classes: ArrayLike) -> list[str]:
+    """Return a colour for each node: one for each class of several nodes, and ALONE for single nodes."""
+    _, index, sizes = np.unique(np.asarray(classes), return_inverse=True, return_counts=True)
+    place = np.cumsum(sizes > 1) - 1
+    return [COLOURS[place[k] % len(COLOURS)] if sizes[k] > 1 else ALONE for k in index]
 
 
 def svg(value: HasDrawing, width: int = 300) -> str:

@@ -550,8 +550,22 @@ def msf(
     >>> float(function.alpha[0]), round(float(function.alpha[-1]), 10)
     (0.0, 0.69)
     """
-    given = Given(msf, parameters, more, ORBITS)
-    expect_vanishing("msf", check_scene(scene).equations)
+    averaging = Averaging.for_scene(
+        scene, precision, periods, transient, seed, Execution(workers, None, show_progress, progress)
+    )
+    return on_a_line(Given(msf, parameters, more, ORBITS), scene, alpha, starts, rtol, averaging)
+
+
+def on_a_line(
+    given: Given,
+    scene: Scene,
+    alpha: Sequence[float] | np.ndarray | None,
+    starts: int,
+    rtol: float | None,
+    averaging: Averaging,
+) -> MSF:
+    """Compute a master stability function, for the arguments of a public function."""
+    expect_vanishing(given.function.__name__, check_scene(scene).equations)
     line = row(
         "alpha",
         default_strengths(_with_parameters(given, scene, scene.axes)) if alpha is None else alpha,
@@ -559,8 +573,6 @@ def msf(
         rising=True,
     )
     fine = np.union1d(line, np.linspace(line[0], line[-1], FINE))
-    execution = Execution(workers, None, show_progress, progress)
-    averaging = Averaging.for_scene(scene, precision, periods, transient, seed, execution)
     return MSF(_with_parameters(given, scene), line, transversal(given, scene, fine, starts, rtol, averaging))
 
 
