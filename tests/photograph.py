@@ -817,7 +817,7 @@ def _() -> Quantities:
 def _() -> Quantities:
     seen: Quantities = {}
     for name, graph in (("star", star(5)), ("ring", ring(6)), ("ladder", models.ladder(6))):
-        seen[name] = "\n".join(f"{c.classes} {c.quotient.links} {c.blocks}" for c in orbital_partitions(graph))
+        seen[name] = "\n".join(f"{c.classes} {c.quotients[0].links} {c.blocks}" for c in orbital_partitions(graph))
     seen["bipartite"] = str(clusters(models.complete_bipartite(5), [0, 0, 1, 1, 1]).blocks)
     return seen
 

@@ -218,7 +218,7 @@ def test_what_is_right_is_taken():
     assert Given(runtime.run, {"sigma": range(2), "x_1": "sqrt(4)"}).sweep(PAIR).axes[0].values == (0.0, 1.0)
     assert worker_count(np.int64(2)) == 2
     assert models.from_edges([[0, 1], (1, 2, "1/2"), np.array([2, 3])]).n == 4
-    assert clusters(star(5), "hpppp").quotient.n == 2
+    assert clusters(star(5), "hpppp").quotients[0].n == 2
     assert Criterion(tolerance=1).tolerance == 1.0
     assert float(ENERGY([0, 1, 0, 0], parameters={"sigma": 0})) == 0.5
 

@@ -132,9 +132,9 @@ def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[lis
     """Return the functions of a step in stages, the length of the shared array, the operations of the orbit's step."""
     # the orbit: after each stage, store the coefficients of A at the state of the stage
     plain = variation.orbit
-    blocks = analyse(plain.node, names, plain.varied)
+    blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
     parts = Parts.of(variation, method.stages)
-    writer = UnrolledStep(plain, [blocks], method)
+    writer = UnrolledStep(plain, blocks, method)
     functions = _functions(parts, plain.state, names)
     writer.write(after=lambda i: _note(writer, parts, functions, method, i))
     orbit = Function(
@@ -151,7 +151,8 @@ def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[lis
         "The same step of the modes in one register: writes them, returns their error and their size.",
         tuple(_mode_step(variation, parts, method)),
     )
-    texts = [LANES.function(f) for f in (*node_functions(writer, blocks), *functions.values())]
+    of_nodes = [f for k, kind in enumerate(blocks) for f in node_functions(writer, kind, k)]
+    texts = [LANES.function(f) for f in (*of_nodes, *functions.values())]
     texts += [scaling(method), LANES.function(orbit), LANES.function(modes), CARRY]
     return texts, parts.size, operations(orbit.body)
 

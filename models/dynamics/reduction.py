@@ -21,11 +21,12 @@ from functools import lru_cache, partial
 
 import sympy as sp
 
-from ..graphs.links import LINK_LIMIT
+from ..graphs.links import LINK_LIMIT, numbered
 from ..inputs.names import LinkName
-from ..mechanics.components import TIME, Edge
-from ..symmetries.partitions import class_links, coarsest_balanced
-from .equations import Equations
+from ..mechanics.components import TIME, Edge, Node
+from ..symmetries.partitions import balanced_in_all, class_links
+from .equations import Equations, Layer
+from .synchrony import with_links
 
 
 class NoQuotient(ValueError):
@@ -95,48 +96,119 @@ def quotient(equations: Equations, colours: Sequence[Hashable]) -> tuple[Equatio
     """Return the smallest network with the same motion if nodes of equal colour start equal, and each node's class."""
     if any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
         raise NoQuotient(f"quotient: the {equations.link_count} links of all pairs are too many to be listed")
-    classes = _balanced(equations, colours)
+    classes = balanced_in_all(equations.n, [layer.links for layer in equations.layers], colours)
+    if max(classes) + 1 == equations.n:
+        return equations, classes
+    if equations.numbered:
+        raise NoQuotient(f"quotient: the links differ in {', '.join(equations.numbered)}; nodes are stepped one by one")
+    if equations.mixed or equations.inertial_links:
+        raise NoQuotient("quotient: nodes of several kinds or links with inertia are stepped one by one")
+    if not all(edge.diffusive for edge in equations.edges):
+        raise NoQuotient(
+            "quotient: the coupling is not zero between equal states, so links inside a class would remain"
+        )
     return collapse(equations, classes), classes
 
 
-def _balanced(equations: Equations, colours: Sequence[Hashable]) -> tuple[int, ...]:
-    """Return the coarsest partition with classes of one colour that is balanced in every layer."""
-    classes = coarsest_balanced(equations.n, (), colours)
-    while True:  # refining for one layer may unbalance another one
-        before = classes
-        for layer in equations.layers:
-            classes = coarsest_balanced(equations.n, layer.links, classes)
-        if classes == before or len(equations.layers) < 2:
-            return classes
-
-
 def collapse(equations: Equations, classes: Sequence[int]) -> Equations:
-    """Return the network with one node for each class."""
+    """Return the network with one node for each class of a balanced partition; raise ValueError for any other.
+
+    The weights of links to one class are added.  Links inside a class drop out if they vanish between equal states;
+    others become a part of the rates of the node.
+    """
     if len(classes) != equations.n:
         raise ValueError(f"partition: found {len(classes)} classes for {equations.n} nodes; expected one for each node")
     count = len(set(classes))
     if set(classes) != set(range(count)):
         raise ValueError(f"partition: found the classes {sorted(set(classes))}; expected 0 … {count - 1}")
-    if count == equations.n and list(classes) == list(range(count)):
-        return equations
-    if equations.numbered:
-        raise NoQuotient(f"quotient: the links differ in {', '.join(equations.numbered)}; nodes are stepped one by one")
-    if equations.mixed or equations.inertial_links:
-        raise NoQuotient("quotient: nodes of several kinds or links with inertia are stepped one by one")
-    # Weights of links to one class are added, links inside a class dropped.
     for edge in equations.edges:
         _check_coupling(edge)
-    layers = (replace(layer, links=class_links(equations.n, layer.links, classes)) for layer in equations.layers)
-    return replace(equations, kind_of=(0,) * count, layers=tuple(layer for layer in layers if layer.links))
+    if count == equations.n and list(classes) == list(range(count)):
+        return equations
+    firsts = [list(classes).index(k) for k in range(count)]
+    for i, k in enumerate(classes):
+        if equations.kind_of[i] != equations.kind_of[firsts[k]]:
+            raise ValueError(
+                f"partition: nodes {firsts[k] + 1} and {i + 1} of one class are of different kinds; expected equal nodes"
+            )
+    layers = [replace(layer, links=class_links(equations.n, layer.links, classes)) for layer in equations.layers]
+
+    # Classes with different links inside need nodes of different kinds.
+    kinds = [equations.kind_of[i] for i in firsts]
+    inside = [_inside(layer, equations, classes, firsts) for layer in equations.layers]
+    signatures = list(zip(kinds, *inside, strict=True))
+    kind_of = numbered(signatures)
+    nodes = []
+    for kind, *weights in dict.fromkeys(signatures):
+        node = equations.nodes[kind]
+        for layer, weight in zip(equations.layers, weights, strict=True):
+            node = with_links(node, dict(layer.edge_of)[kind, kind], [weight]) if weight else node
+        nodes.append(node)
+    old_kinds = [kind for kind, *_ in dict.fromkeys(signatures)]
+    layers = [replace(layer, edge_of=_between(layer, old_kinds)) for layer in layers if layer.links]
+    return replace(equations, nodes=tuple(nodes), kind_of=kind_of, layers=tuple(layers))
+
+
+def _between(layer: Layer, old_kinds: Sequence[int]) -> tuple[tuple[tuple[int, int], Edge], ...]:
+    """Return the templates of links between new kinds of nodes, each from an old kind."""
+    edges, kinds = dict(layer.edge_of), list(enumerate(old_kinds))
+    return tuple(((a, b), edges[c, d]) for a, c in kinds for b, d in kinds if (c, d) in edges)
+
+
+def _inside(layer: Layer, equations: Equations, classes: Sequence[int], firsts: Sequence[int]) -> list[Fraction]:
+    """Return for each class the sum of weights that a node feels from its own class; 0 if these links vanish."""
+    acting = {ends for ends, edge in layer.edge_of if ends[0] == ends[1] and not edge.diffusive}
+    sums = [Fraction(0)] * equations.n
+    for link in layer.links if acting else ():
+        if classes[link[0]] == classes[link[1]] and equations.ends(link) in acting:
+            sums[link[0]] += link[2]
+    for i, k in enumerate(classes):
+        if sums[i] != sums[firsts[k]]:
+            raise ValueError(
+                f"partition: nodes {firsts[k] + 1} and {i + 1} of one class feel the weights {sums[firsts[k]]} and {sums[i]} "
+                "of their class, by links that act between equal states; expected equal sums"
+            )
+    return [sums[i] for i in firsts]
+
+
+def by_class(equations: Equations, classes: Sequence[int]) -> Equations:
+    """Return the equations with one kind of nodes for each class, instead of parameters with a value for each node.
+
+    The nodes of a class have the values of its first node, whose names they take: a_3 of node 3.
+    """
+    equations = equations.without_fields()
+    if not equations.varied:
+        return equations
+    firsts = [list(classes).index(k) for k in range(max(classes) + 1)]
+
+    def names(k: int) -> dict[sp.Symbol, sp.Symbol]:
+        kind = equations.node_at(firsts[k])
+        varied = [s for s in kind.parameters if s.name in equations.varied]
+        return {s: sp.Symbol(f"{s.name}_{firsts[k] + 1}", real=True) for s in varied}
+
+    def link(edge: Edge, target: int, source: int) -> Edge:
+        values = {**names(target), **{s: names(source)[parameter] for s, parameter in edge.theirs}}
+        parameters = (*(values.get(s, s) for s in edge.parameters), *(values[s] for s, _ in edge.theirs))
+        rhs = tuple(e.xreplace(values) for e in edge.rhs)
+        return replace(edge, rhs=rhs, parameters=tuple(dict.fromkeys(parameters)), theirs=())
+
+    nodes = [_renamed(equations.node_at(i), names(k)) for k, i in enumerate(firsts)]
+    kinds, layers = [equations.kind_of[i] for i in firsts], []
+    for layer in equations.layers:
+        edges = dict(layer.edge_of)
+        pairs = [(a, b) for a in range(len(firsts)) for b in range(len(firsts)) if (kinds[a], kinds[b]) in edges]
+        edge_of = tuple(((a, b), link(edges[kinds[a], kinds[b]], a, b)) for a, b in pairs)
+        layers.append(replace(layer, edge_of=edge_of))
+    return replace(equations, nodes=tuple(nodes), kind_of=tuple(classes), layers=tuple(layers), varied=())
+
+
+def _renamed(node: Node, names: Mapping[sp.Symbol, sp.Symbol]) -> Node:
+    return node.map(lambda e: e.xreplace(dict(names)))
 
 
 @lru_cache(maxsize=64)
 def _check_coupling(edge: Edge) -> None:
-    """Raise NoQuotient unless links add up by their weights and vanish between equal states."""
-    if not edge.diffusive:
-        raise NoQuotient(
-            "quotient: the coupling is not zero between equal states, so links inside a class would remain"
-        )
+    """Raise NoQuotient unless links add up by their weights."""
     for e in edge.rhs:
         if sp.simplify(e - edge.weight * e.xreplace({edge.weight: sp.S.One})) != 0:
             raise NoQuotient(f"quotient: the coupling {e} is not proportional to its weight; links cannot be added up")

@@ -14,9 +14,8 @@ Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (S
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import sympy as sp
 
@@ -24,9 +23,6 @@ from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Edge
 from ..mechanics.contact import SLIP
 from .equations import Equations
-
-if TYPE_CHECKING:
-    from ..symmetries.clusters import Block
 
 Entry = tuple[tuple[int, int], sp.Expr]
 """((row, column), expression) of a matrix."""
@@ -138,29 +134,33 @@ def of_network(equations: Equations) -> Events | None:
     return Events((*[-1] * n, *range(n)), exits)
 
 
-def of_blocks(
-    equations: Equations, blocks: Sequence[Block], orbit: Equations, slope: sp.Matrix, strength: sp.Symbol
+def of_slots(
+    equations: Equations,
+    orbit: Equations,
+    slot_clusters: Sequence[int],
+    rows: Sequence[tuple[int, ...]],
+    pushes: Mapping[tuple[int, int], sp.Matrix],
 ) -> Events | None:
-    """Return the events of the contacts of clusters; these events also change differences within clusters."""
-    of_clusters = of_network(orbit)
-    if of_clusters is None:
+    """Return the events of the contacts of clusters, for deviations in slots (`variational.ClusterVariation`).
+
+    `pushes`: for each pair of slots the derivative of the links by the state at their sources.
+    """
+    if not orbit.sticks:
         return None
     releases = _releases(orbit)
     if releases:
         _check_springs(equations.edges)
-    owners, exits = list(of_clusters.owners), [[list(up), list(down)] for up, down in of_clusters.exits]
-    # Rows of a block: first a position for each coordinate of the block, then a velocity for each.
-    for block in blocks:
-        first, size = len(owners), len(block.nodes)
-        owners += [*[-1] * size, *block.nodes]
-        for k, cluster in enumerate(block.nodes if releases else ()):
-            turned = strength * _force_slope(slope).xreplace(orbit.at_node(cluster))
-            for entries, side in zip(exits[cluster], releases[cluster], strict=True):
-                for j, weight in enumerate(block.matrix[k]):
-                    # Coordinate k feels coordinate j by the entry (k, j) of the block.
-                    gradient = sp.Rational(weight.numerator, weight.denominator) * turned + (
-                        side.alone if j == k else 0
-                    )
-                    if gradient != 0:
-                        entries.append(((first + size + k, first + j), side.lead * gradient))
+    owners = [-1] * sum(map(len, rows))
+    exits = [[list[Entry](), list[Entry]()] for _ in releases]
+    for k, c in enumerate(slot_clusters):
+        velocity = rows[k][1]
+        owners[velocity] = c
+        slip = {orbit.symbols(c)[2]: sp.S.One}
+        for entries, side in zip(exits[c], releases[c], strict=True) if releases else ():
+            # The load changes with the position of the slot itself, and with those of the slots that it is linked to.
+            gradients = {k: side.gradient[c]}
+            for (target, j), push in pushes.items():
+                if target == k:
+                    gradients[j] = gradients.get(j, sp.S.Zero) + push[1, 0].xreplace(slip)
+            entries += [((velocity, rows[j][0]), side.lead * g) for j, g in gradients.items() if g != 0]
     return Events(tuple(owners), tuple((tuple(up), tuple(down)) for up, down in exits))

@@ -57,10 +57,7 @@ def _with_links(node: Node, layer: Layer, edge: Edge, n: int) -> Node:
         weights = [[] for _ in range(n)]
         for target, _, weight in layer.links:
             weights[target].append(weight)
-    equal = dict(zip((*edge.here, *edge.there), node.state * 2, strict=True))
-    felt = [e.xreplace(equal) for e in edge.rhs]
-    if any(e.has(sp.nan, sp.zoo, sp.oo, -sp.oo) for e in felt):
-        raise _no_solution(f"a link {', '.join(map(str, edge.rhs))} has no value between equal states")
+    felt = _felt(node, edge)
     differing = [name for name in layer.varied if any(e.has(sp.Symbol(name, real=True)) for e in felt)]
     if differing:
         raise _no_solution(f"a link acts between equal states and {', '.join(differing)} differs from link to link")
@@ -69,11 +66,26 @@ def _with_links(node: Node, layer: Layer, edge: Edge, n: int) -> Node:
         weights = [[sum(of_node, Fraction(0))] for of_node in weights]
     if len({tuple(sorted(of_node)) for of_node in weights}) > 1:
         raise _no_solution("a link acts between equal states and the sums of weights differ from node to node")
-    values = [{edge.weight: sp.Rational(w.numerator, w.denominator)} for w in weights[0]]
+    return with_links(node, edge, weights[0])
+
+
+def with_links(node: Node, edge: Edge, weights: Iterable[Fraction]) -> Node:
+    """Return the node with the rates of links of some weights to nodes in the same state."""
+    felt = _felt(node, edge)
+    values = [{edge.weight: sp.Rational(w.numerator, w.denominator)} for w in weights]
     rates = tuple(rate + sp.Add(*(e.xreplace(w) for w in values)) for rate, e in zip(node.rhs, felt, strict=True))
     used = {s for e in felt for s in e.free_symbols}
     more = tuple(s for s in edge.parameters if s in used and s not in node.parameters)
     return replace(node, rhs=rates, parameters=(*node.parameters, *more))
+
+
+def _felt(node: Node, edge: Edge) -> list[sp.Expr]:
+    """Return the rates of a link between equal states."""
+    equal = {**dict(zip((*edge.here, *edge.there), node.state * 2, strict=True)), **dict(edge.theirs)}
+    felt = [e.xreplace(equal) for e in edge.rhs]
+    if any(e.has(sp.nan, sp.zoo, sp.oo, -sp.oo) for e in felt):
+        raise _no_solution(f"a link {', '.join(map(str, edge.rhs))} has no value between equal states")
+    return felt
 
 
 def _proportional(rates: Iterable[sp.Expr], weight: sp.Symbol) -> bool:

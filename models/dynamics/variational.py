@@ -6,8 +6,10 @@ any number of deviations are integrated along one orbit.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 import sympy as sp
@@ -16,13 +18,15 @@ from ..interactions.link import strength
 from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Edge, Node
 from ..mechanics.jumps import discontinuity, rough_at
+from ..symmetries.blocks import plus
 from .equations import Equations
 from .mode_inertia import effective_slope
-from .reduction import collapse
-from .saltation import Entry, Events, of_blocks, of_mode, of_network
+from .reduction import by_class, collapse
+from .saltation import Entry, Events, of_mode, of_network, of_slots
 from .synchrony import synchronous_node
 
 if TYPE_CHECKING:
+    from ..symmetries.blocks import Exact
     from ..symmetries.clusters import Block, Clusters
 
 MODE = (sp.Symbol("mode_alpha", real=True), sp.Symbol("mode_beta", real=True))
@@ -30,9 +34,6 @@ MODE = (sp.Symbol("mode_alpha", real=True), sp.Symbol("mode_beta", real=True))
 
 With several layers of links, the strength of layer l is mode_alpha_l + i mode_beta_l.
 """
-
-STRENGTH = sp.Symbol("mode_sigma", real=True)
-"""Coupling strength sigma in the variational equation of a cluster state."""
 
 PHASE = sp.Symbol("phase", real=True)
 """Shift of time in the equations of `phase_shifted`: t is replaced by t + phase."""
@@ -53,7 +54,7 @@ class Variation:
     events: Events | None = None  # saltation by stick and slip; None for smooth equations
 
     def __post_init__(self) -> None:
-        names = {*self.orbit.state, *self.orbit.parameters, "t"}
+        names, strengths = {*self.orbit.state, *self.orbit.parameters, "t"}, set(self.parameters)
         taken = names & {s.name for s in self.parameters}
         if taken:
             raise ValueError(f"the symbol {min(taken)!r} is needed for the strength of a mode; rename it in the model")
@@ -67,14 +68,15 @@ class Variation:
             if unknown:
                 raise ValueError(f"variation: unknown symbol {min(unknown)!r} in entry ({row}, {column})")
             # Entries must be linear in the strengths: their coefficients are then evaluated once for all modes.
-            slopes = [e.diff(s) for s in self.parameters]
-            if any(slope.has(*self.parameters) for slope in slopes):
+            slopes = [e.diff(s) for s in e.free_symbols & strengths]
+            if any(slope.free_symbols & strengths for slope in slopes):
                 raise ValueError(f"variation: entry ({row}, {column}) is not linear in the strengths of a mode: {e}")
 
     def parts(self, e: sp.Expr) -> list[tuple[sp.Expr, sp.Expr]]:
         """Return the non-zero terms of an entry of A as pairs of a coefficient and its factor, a strength or 1."""
-        constant = e.xreplace(dict.fromkeys(self.parameters, sp.S.Zero))
-        parts = [(constant, sp.S.One), *((e.diff(s), s) for s in self.parameters)]
+        used = [s for s in self.parameters if s in e.free_symbols]
+        constant = e.xreplace(dict.fromkeys(used, sp.S.Zero))
+        parts = [(constant, sp.S.One), *((e.diff(s), s) for s in used)]
         return [(coefficient, strength) for coefficient, strength in parts if coefficient != 0]
 
 
@@ -147,67 +149,140 @@ def network_variation(equations: Equations) -> Variation:
     return Variation(equations, size, matrix, (), of_network(equations))
 
 
-def clustered(equations: Equations, clusters: Clusters) -> Variation:
-    """Return the variational equation of a cluster state.
+@dataclass(frozen=True, slots=True)
+class ClusterVariation:
+    """The variational equation of all blocks of a cluster state, with the strengths that tell the blocks apart.
 
-    The orbit is a solution of the quotient network.  Coordinate k of a block is a deviation from the orbit s_c of its
-    cluster c and obeys d_k' = J(s_c) d_k + sigma sum_l B_kl H d_l, where B is the matrix of the block.
+    A deviation has a number of slots for each cluster, as many as the largest block needs.  Slot k is a deviation from
+    the orbit s_c of its cluster c and obeys
+
+        d_k' = (D_c F + sum over links to other clusters of D1 h) d_k + sum over layers and slots j of B_kj D2 h d_j,
+
+    where h is a link of weight 1 from the cluster of j to that of k.  The numbers B are the strengths.  The quotient's
+    own motion is the deviation whose B holds the total weights between clusters.
+    """
+
+    variation: Variation
+    rows: tuple[tuple[int, ...], ...]  # for each slot its rows in a deviation
+    slots: tuple[tuple[int, ...], ...]  # for the quotient's own motion, then for each block: the slots it uses
+    strengths: tuple[tuple[Exact, ...], ...]  # for the quotient's own motion, then for each block
+
+
+def clustered(equations: Equations, clusters: Clusters) -> ClusterVariation:
+    """Return the variational equation of a cluster state; the order of its layers is that of the equations.
 
     References
     ----------
-    Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014).
+    Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014); several layers and links that act between
+    equal states: Zhang & Motter, SIAM Rev. 62, 817 (2020).
     """
-    equations.expect_alike("cluster states")
-    slope = _constant_slope(equations)
-    orbit = collapse(equations, clusters.classes)
-    components = len(orbit.node.continuous)
-    # The deviations of the quotient network come first, then the blocks of differences within clusters.
-    first = orbit.n * components
-    entries = {key: e for key, e in orbit.jacobian().items() if max(key) < first}
-    for block in clusters.blocks:
-        for (row, column), e in _of_block(block, orbit, slope):
-            key = (first + row, first + column)
-            entries[key] = entries.get(key, sp.S.Zero) + e
-        first += len(block.nodes) * components
-    matrix = tuple((key, e) for key, e in sorted(entries.items()) if e != 0)
-    return Variation(orbit, first, matrix, (STRENGTH,), of_blocks(equations, clusters.blocks, orbit, slope, STRENGTH))
+    _expect_clusterable(equations)
+    by_classes = by_class(equations, clusters.classes)
+    orbit, firsts = collapse(by_classes, clusters.classes), [members[0] for members in clusters.members]
+    # Parameters of links inside clusters that no rate of the orbit contains.
+    edges = [{(a, b): e for (a, b), e in layer.edge_of} for layer in by_classes.layers]
+    known = {*orbit.parameters, *orbit.state}
+    more = {s for of_layer in edges for e in of_layer.values() for s in e.parameters if s.name not in known}
+    first = orbit.nodes[0]
+    extended = replace(first, parameters=(*first.parameters, *sorted(more, key=lambda s: s.name)))
+    orbit = replace(orbit, nodes=(extended, *orbit.nodes[1:]))
 
+    # Slots: as many for each cluster as its largest block needs, and one at least.
+    counts = [max([1, *(block.cluster_of.count(c) for block in clusters.blocks)]) for c in range(orbit.n)]
+    slot_clusters = [c for c, count in enumerate(counts) for _ in range(count)]
+    used = [_slots(range(orbit.n), slot_clusters), *(_slots(b.cluster_of, slot_clusters) for b in clusters.blocks)]
+    matrices = [_coupling_matrices(clusters, None), *(_coupling_matrices(clusters, b) for b in clusters.blocks)]
+    # One strength for each layer and pair of slots that some block couples.
+    symbols: dict[tuple[int, int, int], sp.Symbol] = {}
+    table: list[dict[sp.Symbol, Exact]] = [{} for _ in used]
+    for row, slots, of_layers in zip(table, used, matrices, strict=True):
+        for layer, matrix in enumerate(of_layers):
+            for k, line in zip(slots, matrix, strict=True):
+                for j, number in zip(slots, line, strict=True):
+                    if number != 0:
+                        s = sp.Symbol(f"mode_{layer + 1}_{k + 1}_{j + 1}", real=True)
+                        row[symbols.setdefault((layer, k, j), s)] = number
+    order = sorted(symbols)
+    strengths = tuple(tuple(row.get(symbols[key], Fraction(0)) for key in order) for row in table)
 
-def _of_block(block: Block, orbit: Equations, slope: sp.Matrix) -> Iterator[tuple[tuple[int, int], sp.Expr]]:
-    """Yield ((row, column), entry) of one block, component by component; keys repeat."""
-    size, jacobian, components = len(block.nodes), orbit.node.jacobian(), len(orbit.node.continuous)
-    for r, line in enumerate(jacobian[:components]):
-        for c, entry in enumerate(line[:components]):
-            for k, cluster in enumerate(block.nodes):
-                yield (r * size + k, c * size + k), entry.xreplace(orbit.at_node(cluster))
-                for j, weight in enumerate(block.matrix[k]):
-                    factor = sp.Rational(weight.numerator, weight.denominator)
-                    push = slope[r, c].xreplace(orbit.at_node(cluster))
-                    yield (r * size + k, c * size + j), STRENGTH * factor * push
-
-
-def _constant_slope(equations: Equations) -> sp.Matrix:
-    """Return H of a link that is linear in the difference of the states at its ends; else raise ValueError."""
-    edge = equations.edge
-    if edge is not None and not edge.diffusive:
+    # Rows of a deviation, slot by slot; contacts have none.
+    sizes = [len(orbit.node_at(c).continuous) for c in slot_clusters]
+    ends = list(accumulate(sizes, initial=0))
+    rows = tuple(tuple(range(a, b)) for a, b in pairwise(ends))
+    entries: dict[tuple[int, int], sp.Expr] = {}
+    jacobian, places = orbit.jacobian(), orbit.places
+    for k, c in enumerate(slot_clusters):
+        for r, row_of in enumerate(rows[k]):
+            for q, column in enumerate(rows[k]):
+                entries[row_of, column] = jacobian.get((places[c][r], places[c][q]), sp.S.Zero)
+    pushes: dict[tuple[int, int], sp.Matrix] = {}
+    for layer, k, j in order:
+        c, d = slot_clusters[k], slot_clusters[j]
+        ends_of = by_classes.kind_of[firsts[c]], by_classes.kind_of[firsts[d]]
+        slope = _slope(edges[layer][ends_of], orbit, c, d) * symbols[layer, k, j]
+        pushes[k, j] = pushes.get((k, j), sp.zeros(*slope.shape)) + slope
+    for (k, j), push in pushes.items():
+        for r, row_of in enumerate(rows[k]):
+            for q, column in enumerate(rows[j]):
+                entries[row_of, column] = entries.get((row_of, column), sp.S.Zero) + push[r, q]
+    matrix_entries = tuple((key, e) for key, e in sorted(entries.items()) if e != 0)
+    if not orbit.forced and any(e.has(TIME) for _, e in matrix_entries):
         raise ValueError(
-            "a link acts between equal states, which cluster states do not allow yet; expected links that vanish there"
+            "cluster states: a link inside a cluster depends on time; expected one of states and parameters"
         )
-    if edge is None:
+    events = of_slots(by_classes, orbit, slot_clusters, rows, pushes)
+    parameters = tuple(symbols[key] for key in order)
+    variation = Variation(orbit, ends[-1], matrix_entries, parameters, events)
+    return ClusterVariation(variation, rows, tuple(used), strengths)
+
+
+def _expect_clusterable(equations: Equations) -> None:
+    """Raise ValueError for networks whose cluster states have no variational equation here."""
+    equations.expect_exact_links("cluster states")
+    if not equations.link_count:
         raise ValueError("these equations have no coupling; differences within clusters need links")
-    (slope,) = source_slopes(equations)
-    size = len(equations.node.continuous)
-    # With set-valued friction links move a body only in slip: set the mode to 1.
-    slips = dict.fromkeys(edge.here[size:], sp.S.One)
-    here, there = (
-        sp.Matrix(block)[:size, :size].xreplace(slips) for block in (edge.jacobian_here(), edge.jacobian_there())
-    )
-    if there.has(*edge.here, *edge.there) or (here + there).applyfunc(sp.simplify) != sp.zeros(*here.shape):
-        raise ValueError(
-            f"a link {', '.join(map(str, edge.rhs))} has a derivative that depends on the states it joins; cluster states "
-            "need one that is linear in their difference"
-        )
-    return slope
+    if equations.inertial:
+        raise ValueError("cluster states: found links with inertia, or a mass matrix; expected neither")
+    if any(edge.oriented for edge in equations.edges):
+        raise ValueError("cluster states: found links that tell their ends apart; expected links with weights alone")
+
+
+def _slots(clusters: Sequence[int], slot_clusters: Sequence[int]) -> tuple[int, ...]:
+    """Return the slot of each coordinate of a block, the first free one of its cluster."""
+    taken: list[int] = []
+    for c in clusters:
+        taken.append(next(k for k, of in enumerate(slot_clusters) if of == c and k not in taken))
+    return tuple(taken)
+
+
+def _coupling_matrices(clusters: Clusters, block: Block | None) -> list[list[list[Exact]]]:
+    """Return for each layer the matrix B of a block, or of the quotient's own motion.
+
+    B is the matrix of weights minus the sums of weights inside clusters on its diagonal.  A block of G has all sums of
+    weights there, so that those from other clusters are added.
+    """
+    of_layers: list[list[list[Exact]]] = []
+    for layer, graph in enumerate(clusters.quotients):
+        if block is None:
+            of_layers.append(
+                [[x if r != c else Fraction(0) for c, x in enumerate(row)] for r, row in enumerate(graph.rows)]
+            )
+            continue
+        outside = [-graph.rows[c][c] for c in range(graph.n)]
+        matrix = [list(row) for row in block.matrices[layer]]
+        for k, c in enumerate(block.cluster_of):
+            matrix[k][k] = plus(matrix[k][k], outside[c])
+        of_layers.append(matrix)
+    return of_layers
+
+
+def _slope(edge: Edge, orbit: Equations, c: int, d: int) -> sp.Matrix:
+    """Return the derivative by the state of its source of a link of weight 1 from cluster d to cluster c."""
+    if c == d:
+        _check_smooth(edge, orbit.node_at(c))
+    values = orbit.at_link((c, d, Fraction(1)), edge)
+    rows, columns = len(orbit.node_at(c).continuous), len(orbit.node_at(d).continuous)
+    return sp.Matrix(edge.jacobian_there())[:rows, :columns].xreplace(values)
 
 
 def phase_shifted(variation: Variation) -> Variation:
@@ -273,12 +348,7 @@ def source_slopes(equations: Equations) -> tuple[sp.Matrix, ...]:
 def _source_slope(edge: Edge, node: Node) -> sp.Matrix:
     """Return H of one layer, without inertia."""
     sigma = strength(edge, node.parameters)
-    equal = {**dict(zip((*edge.here, *edge.there), node.state * 2, strict=True)), **dict(edge.theirs)}
-    part = next((part for e in edge.rhs if (part := rough_at(e, equal, edge.there)) is not None), None)
-    if part is not None:
-        raise ValueError(
-            f"small deviations: found {part}, by which a link jumps or has a kink between equal states; expected a derivative there"
-        )
+    equal = _check_smooth(edge, node)
     # The derivative must be sigma W H(s), where W is the weight: then sigma gamma is the strength of a mode.
     weighted = sp.Matrix(edge.jacobian_there()).xreplace(equal)
     matrix = weighted.xreplace({edge.weight: sp.S.One})
@@ -293,3 +363,14 @@ def _source_slope(edge: Edge, node: Node) -> sp.Matrix:
     if slope.has(TIME):
         raise ValueError("between equal states links depend on time; expected on states and parameters alone")
     return slope
+
+
+def _check_smooth(edge: Edge, node: Node) -> dict[sp.Symbol, sp.Expr]:
+    """Raise ValueError for a link without a derivative between equal states; return the values of its symbols there."""
+    equal = {**dict(zip((*edge.here, *edge.there), node.state * 2, strict=True)), **dict(edge.theirs)}
+    part = next((part for e in edge.rhs if (part := rough_at(e, equal, edge.there)) is not None), None)
+    if part is not None:
+        raise ValueError(
+            f"small deviations: found {part}, by which a link jumps or has a kink between equal states; expected a derivative there"
+        )
+    return equal

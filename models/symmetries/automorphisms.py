@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator, Sequence
 
 from ..graphs.topology import Topology
-from .partitions import coarsest_balanced
+from .partitions import balanced_in_all
 
 Permutation = tuple[int, ...]
 """The image of each node."""
@@ -15,10 +15,15 @@ STEP_LIMIT = 2_000_000
 """Most images that a search tries (a few seconds), a choice."""
 
 
-def automorphisms(graph: Topology, limit: int = 20_000, step_limit: int = STEP_LIMIT) -> tuple[Permutation, ...]:
-    """Return all automorphisms of a graph with weights and directions, the identity first."""
-    permutations: list[Permutation] = []
-    for permutation in _search(graph, step_limit):
+def automorphisms(
+    graphs: Sequence[Topology],
+    limit: int = 20_000,
+    step_limit: int = STEP_LIMIT,
+    kinds: Sequence[Hashable] | None = None,
+) -> tuple[Permutation, ...]:
+    """Return all permutations that preserve weights and directions of all layers and kinds, the identity first."""
+    graph, permutations = graphs[0], list[Permutation]()
+    for permutation in _search(graphs, step_limit, kinds):
         if len(permutations) == limit:
             raise ValueError(
                 f"{graph.name}({graph.n}) has more than {limit} automorphisms; expected at most {limit}: raise "
@@ -28,24 +33,27 @@ def automorphisms(graph: Topology, limit: int = 20_000, step_limit: int = STEP_L
     return tuple(sorted(permutations))
 
 
-def _search(graph: Topology, step_limit: int) -> Iterator[Permutation]:
+def _search(graphs: Sequence[Topology], step_limit: int, kinds: Sequence[Hashable] | None) -> Iterator[Permutation]:
     """Yield the automorphisms by backtracking: choose the image of one node after the other, neighbours first."""
     # An automorphism preserves the classes of the coarsest balanced partition: try only images of the same class.
-    weights = graph.rows
-    colour = coarsest_balanced(graph.n, graph.links, [row[i] for i, row in enumerate(weights)])
-    order, anchor = _order(graph, colour)
-    near = _neighbours(graph)
+    graph, n, layers = graphs[0], graphs[0].n, [each.rows for each in graphs]
+    colours = [(kinds[i] if kinds is not None else 0, *(rows[i][i] for rows in layers)) for i in range(n)]
+    colour = balanced_in_all(n, [each.links for each in graphs], colours)
+    # The weights of a link in all layers.
+    weights = [list(zip(*rows, strict=True)) for rows in zip(*layers, strict=True)]
+    near = _neighbours(graphs)
+    order, anchor = _order(near, colour)
     image: dict[int, int] = {}
     used: set[int] = set()
     steps = 0
 
     def extend(depth: int) -> Iterator[Permutation]:
         nonlocal steps
-        if depth == graph.n:
-            yield tuple(image[i] for i in range(graph.n))
+        if depth == n:
+            yield tuple(image[i] for i in range(n))
             return
         i = order[depth]
-        for j in near[image[anchor[i]]] if i in anchor else range(graph.n):
+        for j in near[image[anchor[i]]] if i in anchor else range(n):
             steps += 1
             if steps > step_limit:
                 raise ValueError(
@@ -64,11 +72,10 @@ def _search(graph: Topology, step_limit: int) -> Iterator[Permutation]:
     return extend(0)
 
 
-def _order(graph: Topology, colour: tuple[int, ...]) -> tuple[list[int], dict[int, int]]:
+def _order(near: list[list[int]], colour: tuple[int, ...]) -> tuple[list[int], dict[int, int]]:
     """Order the nodes breadth first, from rare colours; map each to an earlier neighbour, if it has one."""
-    near = _neighbours(graph)
     # Nodes of rare colours have few possible images: start there to keep the search short.
-    rare = sorted(range(graph.n), key=lambda i: (colour.count(colour[i]), i))
+    rare = sorted(range(len(near)), key=lambda i: (colour.count(colour[i]), i))
     order: list[int] = []
     anchor: dict[int, int] = {}
     seen: set[int] = set()
@@ -86,10 +93,11 @@ def _order(graph: Topology, colour: tuple[int, ...]) -> tuple[list[int], dict[in
     return order, anchor
 
 
-def _neighbours(graph: Topology) -> list[list[int]]:
-    """Return for each node its neighbours by links in either direction, ascending."""
-    near: list[set[int]] = [set() for _ in range(graph.n)]
-    for target, source, _ in graph.links:
-        near[target].add(source)
-        near[source].add(target)
+def _neighbours(graphs: Sequence[Topology]) -> list[list[int]]:
+    """Return for each node its neighbours by links in either direction in any layer, ascending."""
+    near: list[set[int]] = [set() for _ in range(graphs[0].n)]
+    for graph in graphs:
+        for target, source, _ in graph.links:
+            near[target].add(source)
+            near[source].add(target)
     return [sorted(nodes) for nodes in near]

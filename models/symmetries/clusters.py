@@ -2,30 +2,30 @@
 
 A symmetry of the graph maps solutions to solutions, so nodes in one orbit of a group of symmetries can
 stay equal.  To first order, the differences within clusters obey linear equations that contain no other
-variables.  In the coordinates x_i - x_first(cluster) these equations have rational coefficients and
-separate into blocks, one for each set of intertwined clusters.  Because the row sums of G are zero, the
-invariant partitions of G are the external equitable partitions.
+variables.  These equations separate into the finest blocks that the matrices of all layers and the
+projectors on the clusters leave invariant (`blocks`).  Because the row sums of G are zero, the invariant
+partitions of G are the external equitable partitions.
 
 Sources: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014): clusters from
 symmetries, blocks, isolated desynchronisation; Golubitsky & Stewart, Bull. Amer. Math. Soc. 43, 305
-(2006): balanced partitions.
+(2006): balanced partitions; Zhang & Motter, SIAM Rev. 62, 817 (2020), and Zhang, Latora & Motter, Commun.
+Phys. 4, 195 (2021): finest blocks without symmetries, several layers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence, Set
+from collections.abc import Collection, Hashable, Mapping, Sequence, Set
 from dataclasses import dataclass
-from fractions import Fraction
 
-from flint import fmpq_mat, fmpq_poly
+from flint import fmpq, fmpq_mat
 
 from ..algebra.rationals import to_flint
 from ..graphs.links import join, numbered
 from ..graphs.readers import as_topology
 from ..graphs.topology import Topology
 from ..inputs.checks import typed_repr
-from ..spectra.eigenvalue import ProofError
 from .automorphisms import automorphisms
+from .blocks import Generator, Rows, irreducible_subspaces
 from .partitions import class_links
 
 NODE_LIMIT = 64
@@ -34,45 +34,58 @@ NODE_LIMIT = 64
 PARTITION_LIMIT = 5000
 """Most partitions in a list, a choice."""
 
-Rows = tuple[tuple[Fraction, ...], ...]
+Graphs = Topology | Sequence[Topology]
+"""A graph, or the graphs of several layers of links on the same nodes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
     """A set of differences that influence each other, and no differences outside the set."""
 
-    clusters: tuple[int, ...]  # the intertwined clusters
-    nodes: tuple[int, ...]  # for each of the b coordinates, the cluster that contains its nodes
-    pairs: tuple[tuple[int, int], ...]  # coordinate k is x_i - x_j for ``pairs[k] = (i, j)``
-    matrix: Rows  # b x b; replaces G in the variational equation
+    cluster_of: tuple[int, ...]  # for each of the b coordinates, the cluster whose nodes differ
+    nodes: tuple[int, ...]  # the nodes that differ in any set with these equations, ascending
+    matrices: tuple[Rows, ...]  # for each layer b x b exact numbers; they replace G in the variational equation
+    multiplicity: int = 1  # number of sets of differences with these equations
+
+    @property
+    def clusters(self) -> tuple[int, ...]:
+        """The intertwined clusters."""
+        return tuple(sorted(set(self.cluster_of)))
 
 
 @dataclass(frozen=True, slots=True)
 class Clusters:
-    """A balanced partition.  The eigenvalues of the quotient and of all blocks together are those of G.
+    """A partition that is balanced in every layer.
+
+    With a single layer, the eigenvalues of the quotient and of all blocks, each as often as its multiplicity, are those
+    of G.
 
     Parameters
     ----------
     classes : tuple of int
         The cluster of each node; clusters are numbered by their first nodes.
-    quotient : Topology
-        The graph whose nodes are the clusters.
+    quotients : tuple of Topology
+        For each layer the graph whose nodes are the clusters.
     blocks : tuple of Block
-        The differences within clusters.
+        The differences within clusters, in the finest blocks.
     """
 
     classes: tuple[int, ...]
-    quotient: Topology
+    quotients: tuple[Topology, ...]
     blocks: tuple[Block, ...]
 
     @property
     def members(self) -> tuple[tuple[int, ...], ...]:
         """The nodes of each cluster, ascending."""
-        return tuple(tuple(i for i, k in enumerate(self.classes) if k == c) for c in range(self.quotient.n))
+        count = self.quotients[0].n
+        return tuple(tuple(i for i, k in enumerate(self.classes) if k == c) for c in range(count))
 
 
 def orbital_partitions(
-    graph: Topology, limit: int = 20_000, partition_limit: int = PARTITION_LIMIT
+    graph: Graphs,
+    limit: int = 20_000,
+    partition_limit: int = PARTITION_LIMIT,
+    kinds: Sequence[Hashable] | None = None,
 ) -> tuple[Clusters, ...]:
     """Return all partitions into orbits of groups of symmetries, the finest first.
 
@@ -81,12 +94,14 @@ def orbital_partitions(
 
     Parameters
     ----------
-    graph : Topology
-        The graph.
+    graph : Topology or sequence of Topology
+        The graph, or the graphs of several layers; a symmetry preserves the weights of every layer.
     limit : int, optional
         Most automorphisms.
     partition_limit : int, optional
         Most partitions.
+    kinds : sequence, optional
+        The kind of each node, if nodes differ; a symmetry maps nodes to nodes of the same kind.
 
     Returns
     -------
@@ -97,36 +112,42 @@ def orbital_partitions(
     ------
     ValueError
         On more than NODE_LIMIT nodes, `limit` automorphisms or `partition_limit` partitions.
+
+    Examples
+    --------
+    >>> from synchain.models import orbital_partitions, ring, star
+    >>> [state.classes for state in orbital_partitions([ring(4), star(4)])]
+    [(0, 1, 2, 3), (0, 1, 2, 1)]
     """
-    graph = as_topology("orbital_partitions", graph)
-    if graph.n > NODE_LIMIT:
+    graphs = _layers("orbital_partitions", graph)
+    first = graphs[0]
+    if first.n > NODE_LIMIT:
         raise ValueError(
-            f"{graph.name}({graph.n}): expected at most {NODE_LIMIT} nodes to look for symmetries; describe single "
+            f"{first.name}({first.n}): expected at most {NODE_LIMIT} nodes to look for symmetries; describe single "
             "partitions with `clusters`"
         )
     # Start from the partitions into cycles of one symmetry; all orbital partitions are joins of these.  Close the set
     # under joins, in the order from fine to coarse.
-    cycles = {join(graph.n, enumerate(g)) for g in automorphisms(graph, limit)}
-    closed = {tuple(range(graph.n))}
+    cycles = {join(first.n, enumerate(g)) for g in automorphisms(graphs, limit, kinds=kinds)}
+    closed = {tuple(range(first.n))}
     for partition in sorted(cycles, key=_fine_first):
         if partition not in closed:  # otherwise already made as a join
-            closed |= {join(graph.n, [*_stars(partition), *_stars(other)]) for other in closed}
+            closed |= {join(first.n, [*_stars(partition), *_stars(other)]) for other in closed}
         if len(closed) > partition_limit:
             raise ValueError(
-                f"{graph.name}({graph.n}) has more than {partition_limit} orbital partitions; describe single ones with "
+                f"{first.name}({first.n}) has more than {partition_limit} orbital partitions; describe single ones with "
                 "`clusters`"
             )
-    characteristic = _polynomial(graph.rows)
-    return tuple(_described(graph, partition, characteristic) for partition in sorted(closed, key=_fine_first))
+    return tuple(_described(graphs, partition) for partition in sorted(closed, key=_fine_first))
 
 
-def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
+def clusters(graph: Graphs, classes: Sequence[int]) -> Clusters:
     """Return the cluster state of any balanced partition, with or without symmetry.
 
     Parameters
     ----------
-    graph : Topology
-        The graph.
+    graph : Topology or sequence of Topology
+        The graph, or the graphs of several layers of links.
     classes : sequence
         The cluster of each node.
 
@@ -137,58 +158,79 @@ def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
     Raises
     ------
     ValueError
-        If the partition is not balanced, or does not give one cluster for each node.
+        If the partition is not balanced in every layer, or does not give one cluster for each node.
     TypeError
         If `classes` is no sequence.
+
+    Examples
+    --------
+    Two layers that do not commute: the differences of all nodes separate into blocks of one and two.
+
+    >>> from synchain.models import clusters, ring, star
+    >>> [(len(block.cluster_of), block.multiplicity) for block in clusters([ring(4), star(4)], [0] * 4).blocks]
+    [(2, 1), (1, 1)]
     """
-    graph = as_topology("clusters", graph)
+    graphs = _layers("clusters", graph)
+    n = graphs[0].n
     if not isinstance(classes, Collection) or isinstance(classes, Set | Mapping):
         raise TypeError(f"partition: found {typed_repr(classes)}; expected the cluster of each node, e.g. [0, 0, 1]")
-    if len(classes) != graph.n:
-        raise ValueError(f"partition: found {len(classes)} classes for {graph.n} nodes; expected one for each node")
-    return _described(graph, numbered(classes), _polynomial(graph.rows))
+    if len(classes) != n:
+        raise ValueError(f"partition: found {len(classes)} classes for {n} nodes; expected one for each node")
+    return _described(graphs, numbered(classes))
 
 
-def _described(graph: Topology, classes: tuple[int, ...], characteristic: fmpq_poly) -> Clusters:
-    """Compute quotient and blocks of a balanced partition and check them against det(x - G)."""
-    quotient = Topology(f"{graph.name} quotient", max(classes) + 1, class_links(graph.n, graph.links, classes))
-    state = Clusters(classes, quotient, _blocks(graph, classes))
-    check(state, graph, characteristic)
-    return state
+def _layers(what: str, value: object) -> tuple[Topology, ...]:
+    """Return the graphs of all layers, which have the same number of nodes."""
+    several = isinstance(value, Sequence) and all(isinstance(graph, Topology) for graph in value)
+    graphs = tuple(value) if several and isinstance(value, Sequence) else (as_topology(what, value),)
+    sizes = sorted({graph.n for graph in graphs})
+    if len(sizes) != 1:
+        found = " and ".join(map(str, sizes)) or "no"
+        raise ValueError(f"{what}: found graphs of {found} nodes; expected graphs on the same nodes")
+    return graphs
 
 
-def check(state: Clusters, graph: Topology, characteristic: fmpq_poly) -> None:
-    """Raise ProofError unless the characteristic polynomials of quotient and blocks multiply to that of G."""
-    product = _polynomial(state.quotient.rows)
-    for block in state.blocks:
-        product *= _polynomial(block.matrix)
-    if product != characteristic:
-        raise ProofError(
-            f"clusters {state.classes} of {graph.name}({graph.n}): quotient and blocks multiply out to {product}; "
-            f"expected the characteristic polynomial {characteristic}"
-        )
+def _described(graphs: tuple[Topology, ...], classes: tuple[int, ...]) -> Clusters:
+    """Compute quotients and blocks of a partition that is balanced in every layer."""
+    count = max(classes) + 1
+    quotients = tuple(
+        Topology(f"{graph.name} quotient", count, class_links(graph.n, graph.links, classes)) for graph in graphs
+    )
+    return Clusters(classes, quotients, _blocks(graphs, classes))
 
 
-def _blocks(graph: Topology, classes: tuple[int, ...]) -> tuple[Block, ...]:
-    """Separate the differences from the first nodes of clusters into blocks."""
-    # Coordinates y_k = x_i - x_j, where j is the first node of the cluster of i: y = T x.  The embedding L sets
-    # x_i = y_k, and 0 on first nodes.  Then y' = T G L y, because the partition is balanced and the common motion of
-    # a cluster drops out (Pecora et al. 2014, the lower right block of T G T^-1).
+def _blocks(graphs: tuple[Topology, ...], classes: tuple[int, ...]) -> tuple[Block, ...]:
+    """Separate the differences within clusters into the finest blocks."""
+    # Coordinates y_k = x_i minus the mean of the cluster of i, for all nodes i but the first of each cluster.  These
+    # vectors are orthogonal to all that is constant on clusters, so adjoint and transpose are the same.
     first = _first_members(classes)
-    pairs = [(i, first[k]) for i, k in enumerate(classes) if i != first[k]]
-    rows = graph.rows
-    matrix = [[rows[i][column] - rows[j][column] for column, _ in pairs] for i, j in pairs]
-
-    # Clusters are intertwined, and share a block, if the rates of one's differences contain the other's differences.
-    cluster_of = [classes[i] for i, _ in pairs]
-    coupled = [(cluster_of[a], cluster_of[b]) for a, row in enumerate(matrix) for b, entry in enumerate(row) if entry]
-    group = join(max(classes) + 1, coupled)
+    nodes = [i for i, k in enumerate(classes) if i != first[k]]
+    if not nodes:
+        return ()
+    embed, sizes = fmpq_mat(len(classes), len(nodes)), [classes.count(k) for k in range(max(classes) + 1)]
+    part = fmpq_mat(len(nodes), len(classes))
+    for c, i in enumerate(nodes):
+        embed[i, c], embed[first[classes[i]], c] = 1, -1
+        for j, k in enumerate(classes):
+            part[c, j] = fmpq(int(i == j)) - (fmpq(1, sizes[k]) if k == classes[i] else 0)
+    layers = []
+    for graph in graphs:
+        g = fmpq_mat([[to_flint(x) for x in row] for row in graph.rows])
+        layers.append(Generator(part * g * embed, part * g.transpose() * embed))
+    of_nodes = [classes[i] for i in nodes]
+    projectors = [
+        fmpq_mat([[int(r == c and k == cluster) for c in range(len(nodes))] for r, k in enumerate(of_nodes)])
+        for cluster in sorted(set(of_nodes))
+    ]
     blocks = []
-    for part in sorted({group[k] for k in cluster_of}):
-        members = [a for a, k in enumerate(cluster_of) if group[k] == part]
-        nodes = tuple(cluster_of[a] for a in members)
-        block = tuple(tuple(matrix[a][b] for b in members) for a in members)
-        blocks.append(Block(tuple(sorted(set(nodes))), nodes, tuple(pairs[a] for a in members), block))
+    for space in irreducible_subspaces(layers, projectors if len(projectors) > 1 else [], len(nodes)):
+        # The first node of a cluster differs unless the others add up to zero in every vector.
+        differing = {i for row in space.hull for i, x in zip(nodes, row, strict=True) if x}
+        for cluster, i in first.items():
+            inside = [c for c, k in enumerate(of_nodes) if k == cluster]
+            differing |= {i} if any(sum(row[c] for c in inside) for row in space.hull) else set()
+        cluster_of = tuple(of_nodes[pivot] for pivot in space.pivots)
+        blocks.append(Block(cluster_of, tuple(sorted(differing)), space.matrices, space.multiplicity))
     return tuple(blocks)
 
 
@@ -204,7 +246,3 @@ def _stars(classes: tuple[int, ...]) -> list[tuple[int, int]]:
 
 def _fine_first(classes: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
     return -max(classes), classes
-
-
-def _polynomial(rows: Rows) -> fmpq_poly:
-    return fmpq_mat([[to_flint(x) for x in row] for row in rows]).charpoly()

@@ -84,6 +84,17 @@ def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]
     return numbered(class_of)
 
 
+def balanced_in_all(n: int, layers: Sequence[Iterable[Link]], colours: Sequence[Hashable]) -> tuple[int, ...]:
+    """Return the coarsest partition with classes of one colour that is balanced in every layer."""
+    classes = coarsest_balanced(n, (), colours)
+    while True:  # refining for one layer may unbalance another one
+        before = classes
+        for links in layers:
+            classes = coarsest_balanced(n, links, classes)
+        if classes == before or len(layers) < 2:
+            return classes
+
+
 def _split(members: list[set[int]], k: int, parts: list[set[int]]) -> list[set[int]]:
     """Split class k into `parts` and the remaining nodes; class k keeps the largest, return the others."""
     remaining = len(members[k]) - sum(map(len, parts))

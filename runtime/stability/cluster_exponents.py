@@ -1,9 +1,10 @@
 """Compute the stability of cluster states: transversal exponents of a network, block by block.
 
 Along one orbit of the quotient network, one deviation is integrated for each block, and one for the motion of the
-clusters themselves. The `OrbitProblem` has sigma as the strength of all deviations.
+clusters themselves. All deviations obey the same equation; the entries of the block are its strengths.
 
-Source: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014).
+Sources: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014); Zhang & Motter, SIAM Rev. 62, 817
+(2020).
 """
 
 from __future__ import annotations
@@ -15,11 +16,12 @@ from enum import StrEnum
 import numpy as np
 import xarray as xr
 
+from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.dynamics.variational import clustered
 from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Scene
-from synchain.models.symmetries.clusters import Clusters, clusters
+from synchain.models.symmetries.clusters import Block, Clusters, clusters
 
 from ..cells.run_keywords import ONE_ORBIT, Given
 from ..results.labelled import Labelled, as_json, dataset
@@ -63,7 +65,8 @@ class ClusterExponents(Labelled):
         Standard error of `motion`.
     separation : ndarray, shape (clusters, clusters)
         Largest difference between the states of two clusters at the ends of blocks of time. A separation of 0
-        means that the clusters have merged; the exponents are then those of a coarser state.
+        means that the clusters have merged; the exponents are then those of a coarser state. Clusters of nodes of
+        different kinds are infinitely far apart.
     time : float
         Length of the average.
     approaching : tuple of (int, int)
@@ -103,7 +106,7 @@ class ClusterExponents(Labelled):
         """The clusters, each block with its verdict, and the clusters that merged or approach each other."""
         members = [", ".join(str(i + 1) for i in nodes) for nodes in self.state.members]
         blocks = [
-            f"{verdict} ({with_error(exponent, error)}): clusters {', '.join(str(c + 1) for c in block.clusters)}"
+            f"{verdict} ({with_error(exponent, error)}): {_text_of(block)}"
             for block, exponent, error, verdict in zip(
                 self.state.blocks, self.exponent, self.stderr, self.verdicts, strict=True
             )
@@ -131,7 +134,7 @@ class ClusterExponents(Labelled):
 
     @property
     def merged(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of clusters that were never more than 1e-9 apart, and so count as one cluster."""
+        """Pairs of clusters of equal nodes that were never more than 1e-9 apart, and so count as one cluster."""
         return _pairs(self.separation < MERGED)
 
     def as_dict(self) -> dict[str, object]:
@@ -140,14 +143,16 @@ class ClusterExponents(Labelled):
         Returns
         -------
         dict
-            classes, blocks (clusters, nodes, exponent, stderr, verdict), motion, motion_stderr,
-            merged, approaching, time.
+            classes, blocks (clusters, nodes, size, multiplicity, exponent, stderr, verdict), motion,
+            motion_stderr, merged, approaching, time.
         """
         rows = zip(self.state.blocks, self.exponent, self.stderr, self.verdicts, strict=True)
         blocks = [
             {
                 "clusters": block.clusters,
-                "nodes": sorted({i for pair in block.pairs for i in pair}),
+                "nodes": block.nodes,
+                "size": len(block.cluster_of),
+                "multiplicity": block.multiplicity,
                 "exponent": exponent,
                 "stderr": error,
                 "verdict": verdict.value,
@@ -189,8 +194,9 @@ def cluster_exponents(
     scene : Scene
         Network of at most eight clusters with its coupling strength.
     state : Clusters or sequence of int
-        Partition of the nodes, from `synchain.models.symmetries.clusters` or as the cluster of each
-        node. Each cluster starts from the state of its first node.
+        Partition of the nodes, from `clusters` or as the cluster of each node. All nodes of a cluster are of one kind
+        and have equal parameters. Each cluster starts from the state of its first node. The partition into a single
+        cluster is complete synchronisation, also with layers that do not commute.
     {average}
     rtol : float, optional
         Relative tolerance of the integration; by default that of the scene. The friction law may require a smaller one.
@@ -206,9 +212,9 @@ def cluster_exponents(
     Raises
     ------
     ValueError
-        If the partition is not balanced or belongs to another graph, if the coupling is not linear
-        in the difference of states, if there are more than eight clusters, or if time enters
-        in the equations without a known period.
+        If the partition is not balanced or belongs to another graph, if nodes of a cluster differ, if
+        links are not proportional to their weights or differ in a parameter, if there are more than eight
+        clusters, or if time enters in the equations without a known period.
     FloatingPointError
         If the integration fails.
 
@@ -225,6 +231,8 @@ def cluster_exponents(
     partition = _of_graph(scene, state)
     reporter = averaging.reporter()
     problem, integrator = _integrator(scene, partition, averaging.seed)
+    orbit = problem.variation.orbit
+    alike = [[_alike(orbit, a, b) for b in range(orbit.n)] for a in range(orbit.n)]
     averaging = averaging.in_units(scene, problem.unit)
     reporter.total = averaging.length
     batches, dropped = Batches(problem.unit), round(averaging.transient)
@@ -232,8 +240,7 @@ def cluster_exponents(
 
     def advance() -> np.ndarray:
         growth = integrator.advance(problem.unit)
-        states = integrator.state[0].reshape(-1, partition.quotient.n)[: problem.components]
-        gaps.append(np.abs(states[:, :, None] - states[:, None, :]).max(axis=0))
+        gaps.append(_separations(integrator.state[0], alike))
         return growth
 
     with reporter:
@@ -261,16 +268,26 @@ def cluster_exponents(
 
 
 def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
-    """Compute the blocks of a partition and check that it belongs to the scene's graph."""
+    """Compute the blocks of a partition; check that it belongs to the scene's graphs, and that clusters are uniform."""
     classes = state.classes if isinstance(state, Clusters) else state
-    partition = clusters(scene.topology, classes)
-    content = (partition.quotient.links, partition.blocks)
-    if isinstance(state, Clusters) and content != (state.quotient.links, state.blocks):
-        graph = scene.topology
+    graphs = [graph for _, graph in scene.model.linked] or [scene.topology]
+    partition = clusters(graphs, classes)
+    if isinstance(state, Clusters) and state != partition:
+        names = " and ".join(f"{graph.name}({graph.n})" for graph in graphs)
         raise ValueError(
-            f"cluster state {classes} belongs to another graph than {graph.name}({graph.n}); make it with clusters(graph, "
-            "classes)"
+            f"cluster state {classes} belongs to another graph than {names}; make it with clusters(graph, classes), or "
+            "with the graphs of all layers"
         )
+    for name in scene.equations.varied:
+        holders = scene.equations.holders(name)
+        for members in partition.members:
+            values = {i: scene.parameters[f"{name}_{i + 1}"] for i in members if i in holders}
+            other = next((i for i in values if values[i] != values[members[0]]), None)
+            if other is not None:
+                raise ValueError(
+                    f"cluster state {classes}: nodes {members[0] + 1} and {other + 1} of one cluster differ in {name}; "
+                    "expected equal nodes in a cluster"
+                )
     return partition
 
 
@@ -279,24 +296,48 @@ def _integrator(scene: Scene, partition: Clusters, seed: int) -> tuple[OrbitProb
 
     The integrator carries a random deviation of the clusters, and one in each block.
     """
-    variation = clustered(without_drive(scene.equations, scene.parameters), partition)
-    firsts = [members[0] for members in partition.members]
-    start = np.array([[values[i] for values in scene.initial.values() for i in firsts]])
-    strengths = np.full(1 + len(partition.blocks), scene.parameters[scene.strength])
-    problem = OrbitProblem.of(scene, variation, strengths, start)
+    equations = without_drive(scene.equations, scene.parameters)
+    parts = clustered(equations, partition)
+    orbit, firsts = parts.variation.orbit, [members[0] for members in partition.members]
+    places = [
+        (name, equations.holders(name).index(firsts[c])) for name in orbit.components for c in orbit.holders(name)
+    ]
+    start = np.array([[scene.initial[name][place] for name, place in places]])
+    strengths = np.array([[float(number) for number in row] for row in parts.strengths])
+    problem = OrbitProblem.of(scene, parts.variation, strengths, start)
     state = problem.with_slip_states(start)
     if not problem.forced:
         problem = problem.with_turns(problem.observed_turns(state, strengths), start)
     integrator = problem.integrator(state)
-    # rows of the variational equation: the clusters' own motion, then one block after the other
-    sizes = [partition.quotient.n, *(len(block.nodes) for block in partition.blocks)]
-    ends = np.cumsum(sizes) * problem.components
     random = np.random.default_rng(seed)
-    deviations = np.zeros((1, variation.size, len(sizes)))
-    for k, (first, last) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
-        deviations[0, first:last, k] = random.normal(size=last - first)
+    deviations = np.zeros((1, parts.variation.size, len(parts.slots)))
+    for k, slots in enumerate(parts.slots):
+        rows = [row for slot in slots for row in parts.rows[slot]]
+        deviations[0, rows, k] = random.normal(size=len(rows))
     integrator.set_deviations(deviations)
     return problem, integrator
+
+
+def _alike(orbit: Equations, first: int, second: int) -> list[tuple[int, int]]:
+    """Return the places of the states of two clusters whose difference counts; none for nodes of different kinds."""
+    if orbit.kind_of[first] != orbit.kind_of[second]:
+        return []
+    count = len(orbit.node_at(first).continuous)
+    return list(zip(orbit.places[first][:count], orbit.places[second][:count], strict=True))
+
+
+def _separations(state: np.ndarray, alike: list[list[list[tuple[int, int]]]]) -> np.ndarray:
+    """Return the largest difference (clusters, clusters) of a component, infinity for nodes of different kinds."""
+    return np.array(
+        [[max((abs(state[p] - state[q]) for p, q in pairs), default=np.inf) for pairs in row] for row in alike]
+    )
+
+
+def _text_of(block: Block) -> str:
+    """Return the clusters of a block with its size and multiplicity, if these exceed 1."""
+    size = len(block.cluster_of)
+    details = [f"size {size}"] * (size > 1) + [f"{block.multiplicity} times"] * (block.multiplicity > 1)
+    return f"clusters {', '.join(str(c + 1) for c in block.clusters)}" + "".join(f", {text}" for text in details)
 
 
 def _pairs(table: np.ndarray) -> tuple[tuple[int, int], ...]:

@@ -48,18 +48,20 @@ def test_exits_of_clusters_are_those_of_the_network() -> None:
     chain = topology("chain", 3)
     equations = jumping(chain).equations
     network = clustered(equations, clusters(chain, (0, 1, 0)))
-    full = of_network(equations)
-    assert network.events is not None
+    full, events = of_network(equations), network.variation.events
     assert full is not None
-    assert network.events.owners == (-1, -1, 0, 1, -1, 0)
-    x1, x2, x3, v1, v2, v3, a, b, c, d, s, m = symbols("x_1 x_2 x_3 v_1 v_2 v_3 a b c d sigma mode_sigma")
+    assert events is not None
+    assert (network.slots, network.rows, events.owners) == (((0, 1), (0,)), ((0, 1), (2, 3)), (-1, 0, -1, 1))
+    x1, x2, x3, v1, v2, v3, a, b, c, d = symbols("x_1 x_2 x_3 v_1 v_2 v_3 a b c d")
     on = {x1: a, x2: b, x3: a, v1: c, v2: d, v3: c}
-    values = {x1: a, x2: b, v1: c, v2: d, m: s}
     first = {column: e.xreplace(on) for (_, column), e in full.exits[0][0]}
-    rows = {key: e.xreplace(values) for key, e in network.events.exits[0][0]}
-    assert sp.simplify(rows[5, 4] - first[0]) == 0  # the difference x_3 - x_1 of the two that move as one
-    assert sp.simplify(rows[2, 0] - first[0]) == 0
-    assert sp.simplify(rows[2, 1] - first[1]) == 0
+    parameters = network.variation.parameters
+    motion, difference = (dict(zip(parameters, map(sp.Rational, row), strict=True)) for row in network.strengths)
+    for strengths, expected in ((motion, first[1]), (difference, 0)):  # x_3 - x_1 does not feel the middle
+        values = {x1: a, x2: b, v1: c, v2: d, **strengths}
+        rows = {key: e.xreplace(values) for key, e in events.exits[0][0]}
+        assert sp.simplify(rows[1, 0] - first[0]) == 0
+        assert sp.simplify(rows[1, 2] - expected) == 0
 
 
 def test_dampers_and_a_jump_have_no_tangent() -> None:

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import Rates, Scene, Topology, chain, clusters, complete, ends, from_matrix, ring
+from synchain.models import Rates, Scene, Topology, chain, complete, ends, from_matrix, ring
 from synchain.models.definitions.loader import load_oscillator
 from synchain.models.dynamics.synchrony import NoSynchrony, expect_vanishing, synchronous_node
-from synchain.models.dynamics.variational import clustered, mode
+from synchain.models.dynamics.variational import mode
 
 G, LAM = sp.symbols("g lam")
 
@@ -93,8 +93,6 @@ def test_what_needs_one_synchronous_motion_for_all_strengths_is_refused() -> Non
         ValueError, match="test: a link acts between equal states, so that the synchronous motion changes"
     ):
         expect_vanishing("test", scene(ring(3)).equations)
-    with pytest.raises(ValueError, match="a link acts between equal states, which cluster states do not allow yet"):
-        clustered(scene(ring(3)).equations, clusters(ring(3), (0, 1, 1)))
 
 
 def test_links_in_layers_move_the_synchronous_motion_together() -> None:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import warnings
+from fractions import Fraction
 
 import mpmath
 import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import Scene, Topology, clusters, from_matrix, orbital_partitions, topology
+from synchain.models import Field, Rates, Scene, Topology, clusters, from_matrix, topology
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.variational import STRENGTH, clustered
-from synchain.models.mechanics.components import Edge
+from synchain.models.dynamics.variational import clustered
 from synchain.runtime import ClusterExponents, cluster_exponents, exponents, run
 
 pytestmark = pytest.mark.long
@@ -39,14 +39,14 @@ def test_a_pair_that_moves_as_one_has_the_exponent_of_its_mode(sigma: float) -> 
 
 
 def test_linear_nodes_have_the_eigenvalues_of_each_block() -> None:
-    """x'' = -x + sigma gamma x': -sigma |gamma| / 2 below critical damping; the slowest mode of each block counts."""
-    for graph, classes, slowest in (
+    """x'' = -x + sigma gamma x': -sigma |gamma| / 2 below critical damping, for the eigenvalue of each block."""
+    for graph, classes, sizes in (
         (STAR, (0, 1, 1, 1), (1,)),
-        (RING, (0, 0, 0, 0), (2,)),
+        (RING, (0, 0, 0, 0), (4, 2)),
         (topology("complete", 4), (0, 0, 1, 1), (4, 4)),
     ):
         result = cluster_exponents(damped(graph, 0.2), classes, transient=40, periods=200, precision=1e-9)
-        np.testing.assert_allclose(result.exponent, [-0.2 * size / 2 for size in slowest], atol=3e-3)
+        np.testing.assert_allclose(result.exponent, [-0.2 * size / 2 for size in sizes], atol=3e-3)
         assert set(result.verdicts) == {"stable"}
 
 
@@ -107,50 +107,200 @@ def numbers(entries: dict, values: dict, size: int) -> mpmath.matrix:
 ONE_WAY = from_matrix(np.kron(np.eye(2, dtype=int), [[-1, 1, 0], [0, -2, 2], [3, 0, -3]]).tolist())
 """Two one-way rings of three, side by side: equal places form three clusters whose one block is not symmetric."""
 
-GRAPHS = {
-    **{graph: None for graph in (STAR, RING, topology("chain", 5))},
-    from_matrix([[-3, 1, 2], [4, -5, 1], [4, 1, -5]]): (0, 1, 1),
-    ONE_WAY: (0, 1, 2, 0, 1, 2),
-}
-"""With a partition, or None for all those that symmetries give."""
+PANEL = from_matrix([[-4, 1, 1, 1, 1], [1, -4, 1, 1, 1], [2, 2, -6, 1, 1], [2, 2, 1, -6, 1], [2, 2, 1, 1, -6]])
+"""A pair and a triple: nodes feel one neighbour in the pair, and two in the triple."""
+
+LORENZ = {"oscillator": "lorenz", "coupling": "x->x, 1/2 y->z"}
+NODE, OTHER = (
+    Field({"x": "y - x**3", "y": "a - x"}, parameters={"a": 0.1}),
+    Field({"y": "-b*y**3"}, parameters={"b": 1}),
+)
+SYNAPSE = Rates({"x": "g*W*(2 - x_i)*tanh(x_j)"}, {"g": 0.3})
+SPRING = Rates({"y": "k*W*((x_j - x_i) + (x_j - x_i)**3)"}, {"k": 0.2})
+COMMON = Rates({"y": "k*W*y_i*y_j"}, {"k": 0.2})
+PUSH = Rates({"x": "q*W*a_i*a_j*(x_j - x_i)"}, {"q": 0.4})
+
+STATES = {
+    "star": (LORENZ, STAR, (0, 1, 1, 1)),
+    "ring": (LORENZ, RING, (0, 1, 0, 1)),
+    "chain": (LORENZ, topology("chain", 5), (0, 1, 2, 1, 0)),
+    "weights": (LORENZ, from_matrix([[-3, 1, 2], [4, -5, 1], [4, 1, -5]]), (0, 1, 1)),
+    "one-way": (LORENZ, ONE_WAY, (0, 1, 2, 0, 1, 2)),
+    "non-linear": ({"oscillator": NODE, "coupling": SPRING}, topology("ring", 6), (0, 1, 2, 0, 1, 2)),
+    "synapses": ({"oscillator": NODE, "coupling": SYNAPSE}, topology("ring", 6), (0, 0, 1, 0, 0, 1)),
+    "unequal sums inside": ({"oscillator": NODE, "coupling": SYNAPSE}, PANEL, (0, 0, 1, 1, 1)),
+    "layers": ({"oscillator": NODE}, [(SPRING, topology("ring", 6)), (SYNAPSE, topology("complete", 6))], (0, 1) * 3),
+    "no common modes": ({"oscillator": NODE}, [(SPRING, RING), (PUSH, STAR)], (0, 0, 0, 0)),
+    "kinds": (
+        {"oscillator": NODE, "nodes": [{"oscillator": OTHER, "at": [1, 4]}], "coupling": COMMON},
+        topology("ring", 6), (0, 1, 1, 0, 1, 1),
+    ),
+    "parameters": (
+        {"oscillator": NODE, "coupling": PUSH, "parameters": {"a": [1, 2, 1, 2]}}, RING, (0, 1, 0, 1),
+    ),
+}  # fmt: skip
+"""Arguments of a scene, its graph or layers, and a partition."""
 
 
-@pytest.mark.parametrize("graph", GRAPHS, ids=repr)
-def test_quotient_and_blocks_are_together_the_jacobian_of_the_network(graph: Topology) -> None:
+def scene_of(name: str) -> tuple[Scene, tuple[int, ...]]:
+    arguments, graph, classes = STATES[name]
+    return Scene(**arguments, **({"links": graph} if isinstance(graph, list) else {"topology": graph})), classes
+
+
+@pytest.mark.filterwarnings("ignore:topology|coupling")
+@pytest.mark.parametrize("name", STATES)
+def test_quotient_and_blocks_are_together_the_jacobian_of_the_network(name: str) -> None:
     """At any state in which clusters move as one: equal characteristic polynomials, 30 digits."""
-    scene = Scene(oscillator="lorenz", coupling="x->x, 1/2 y->z", topology=graph)
+    scene, classes = scene_of(name)
     equations, random = scene.equations, np.random.default_rng(2)
-    states = [clusters(graph, GRAPHS[graph])] if GRAPHS[graph] else orbital_partitions(graph)
-    fixed = {sp.Symbol(name, real=True): sp.Rational(3 + i, 2) for i, name in enumerate(equations.parameters)}
-    for state in states:
-        network = clustered(equations, state)
-        values = {**fixed, STRENGTH: fixed[sp.Symbol("sigma", real=True)]}
-        together = dict(fixed)
-        for k, members in enumerate(state.members):
-            for s in network.orbit.symbols(k):
-                values[s] = sp.Rational(int(random.integers(-9, 9)), 4)
+    state = clusters([graph for _, graph in scene.model.linked], classes)
+    network = clustered(equations, state)
+    # nodes of one class have equal parameters and states
+    values: dict[sp.Symbol, sp.Expr] = {}
+    for k, name_of in enumerate(equations.parameters):
+        base, _, node = name_of.rpartition("_")
+        k = state.members[classes[int(node) - 1]][0] if base in equations.varied else k
+        values[sp.Symbol(name_of, real=True)] = sp.Rational(3 + k, 2)
+    for k, members in enumerate(state.members):
+        for s in network.variation.orbit.symbols(k):
+            values[s] = number = sp.Rational(int(random.integers(-9, 9)), 4)
             for i in members:
-                together |= {a: values[b] for a, b in zip(equations.symbols(i), network.orbit.symbols(k), strict=True)}
-        with mpmath.workdps(40):
-            part = numbers(dict(network.matrix), values, network.size)
-            full = numbers(equations.jacobian(), together, equations.dimension)
-            assert network.size == equations.dimension
-            for shift in (mpmath.mpf("0.3"), mpmath.mpf("-1.7"), mpmath.mpf("2.9")):
-                a, b = (mpmath.det(matrix - shift * mpmath.eye(network.size)) for matrix in (part, full))
-                assert abs(a - b) < mpmath.mpf("1e-30") * abs(b)
+                values[sp.Symbol(f"{s.name.rpartition('_')[0]}_{i + 1}#", real=True)] = number
+    together = {
+        s: values.get(sp.Symbol(f"{s.name}#", real=True), values.get(s))
+        for s in map(real, (*equations.state, *equations.parameters))
+    }
+    with mpmath.workdps(40):
+        full = numbers(equations.jacobian(), together, equations.dimension)
+        parts = []
+        times = [1, *(block.multiplicity for block in state.blocks)]
+        for slots, row, count in zip(network.slots, network.strengths, times, strict=True):
+            strengths = dict(zip(network.variation.parameters, (mpmath.mpf(precise(x)) for x in row), strict=True))
+            whole = numbers(dict(network.variation.matrix), values | strengths, network.variation.size)
+            rows = [r for slot in slots for r in network.rows[slot]]
+            parts += [mpmath.matrix([[whole[r, c] for c in rows] for r in rows])] * count
+        assert sum(part.rows for part in parts) == equations.dimension
+        for shift in (mpmath.mpf("0.3"), mpmath.mpf("-1.7"), mpmath.mpf("2.9")):
+            product = mpmath.mpf(1)
+            for part in parts:
+                product *= mpmath.det(part - shift * mpmath.eye(part.rows))
+            expected = mpmath.det(full - shift * mpmath.eye(full.rows))
+            assert abs(product - expected) < mpmath.mpf("1e-28") * abs(expected)
 
 
-def test_a_coupling_with_a_state_in_its_derivative_is_refused() -> None:
+def precise(number: object) -> mpmath.mpf:
+    """A number of a block to 40 digits."""
+    if isinstance(number, Fraction):
+        return mpmath.mpf(number.numerator) / number.denominator
+    theta = mpmath.findroot(
+        lambda x: mpmath.polyval(number.root.polynomial[::-1], x), float(number.root.enclosure(53).mid())
+    )
+    return sum(mpmath.mpf(c.numerator) / c.denominator * theta**k for k, c in enumerate(number.coefficients))
+
+
+def real(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)
+
+
+# -- runs beside the variational equation of the whole network, by NumPy ------------------------------------------
+
+
+def exponents_of_network(rates, jacobian, state: np.ndarray, subspaces: list[np.ndarray], settle: float, time: float):
+    """Largest exponent of the whole network in each subspace (columns), along an orbit of the clusters.
+
+    Classical Runge-Kutta with fixed steps; deviations are projected onto their subspace.
+    """
+    h, logs = 0.02, np.zeros(len(subspaces))
+    projectors = [space @ np.linalg.pinv(space) for space in subspaces]
+    vectors = [space @ np.random.default_rng(1).normal(size=space.shape[1]) for space in subspaces]
+    for n in range(round((settle + time) / h)):
+        k1 = rates(state)
+        k2 = rates(state + h / 2 * k1)
+        k3 = rates(state + h / 2 * k2)
+        k4 = rates(state + h * k3)
+        a, b, c = jacobian(state), jacobian(state + h / 2 * k1), jacobian(state + h / 2 * k2)
+        d = jacobian(state + h * k3)
+        state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        for k, v in enumerate(vectors):
+            m1 = a @ v
+            m2 = b @ (v + h / 2 * m1)
+            m3 = c @ (v + h / 2 * m2)
+            m4 = d @ (v + h * m3)
+            v = projectors[k] @ (v + h / 6 * (m1 + 2 * m2 + 2 * m3 + m4))
+            size = np.linalg.norm(v)
+            vectors[k] = v / size
+            logs[k] += np.log(size) if n * h >= settle else 0.0
+    return logs / time
+
+
+def test_layers_without_common_modes_have_the_exponents_of_the_network() -> None:
+    """Neurons of FitzHugh and Nagumo: gap junctions on a ring of six, synapses from a star of two-way links.
+
+    The difference of mirrored nodes (0, 0, 1, -1, ...) is apart from the vectors that the mirror leaves alone.
+    """
+    node = Field(
+        {"x": "x - x**3/3 - y + I", "y": "eps*(x + a - b*y)"}, parameters={"I": 0.5, "eps": 0.2, "a": 0.7, "b": 0.8}
+    )
+    gap = Rates({"x": "g*W*(x_j - x_i)"}, {"g": 0.1})
+    slow = Rates({"y": "q*W*(x_j - x_i)"}, {"q": 0.15})
+    ring, star = topology("ring", 6), topology("star", 6)
+    scene = Scene(node, links=[(gap, ring), (slow, star)], initial={"x": 0.3, "y": 0.1})
+    result = cluster_exponents(scene, [0] * 6, transient=20, periods=400, precision=1e-9)
+    sizes = [len(block.cluster_of) for block in result.state.blocks]
+    assert sorted(sizes) == [1, 1, 3]
+    g, s = np.array(ring.rows, dtype=float), np.array(star.rows, dtype=float)
+
+    def rates(state: np.ndarray) -> np.ndarray:
+        x, y = state
+        return np.array([x - x**3 / 3 - y + 0.5, 0.2 * (x + 0.7 - 0.8 * y)])
+
+    def jacobian(state: np.ndarray) -> np.ndarray:
+        one = np.eye(6)
+        return np.block([[(1 - state[0] ** 2) * one + 0.1 * g, -one], [0.2 * one + 0.15 * s, -0.16 * one]])
+
+    odd = np.array([[0, 1, 1, 0, -1, -1], [0, 1, -1, 0, 1, -1]], dtype=float).T
+    even = np.array([[1, 0, 0, -1, 0, 0], [2, -1, 0, 0, 0, -1], [0, 1, -1, 0, -1, 1]], dtype=float).T
+    spaces = [np.kron(np.eye(2), part) for part in (odd[:, :1], odd[:, 1:], even)]
+    expected = exponents_of_network(rates, jacobian, np.array([0.3, 0.1]), spaces, 100.0, 848.0)
+    assert sorted(result.exponent) == pytest.approx(sorted(expected), abs=2e-3)
+    largest = result.exponent[sizes.index(3)]
+    assert largest == pytest.approx(expected[2], abs=2e-3)
+
+
+def test_linear_kinds_have_the_eigenvalues_of_the_network() -> None:
+    """A ring of six: two heavy bodies opposite each other, pairs of light ones between them, and synapses to all."""
+    light, heavy = Field({"x": "-x + y", "y": "-2*y"}), Field({"x": "-x/2"})
+    push = Rates({"x": "k*W*(x_j + x_i/2)"}, {"k": 0.1})
+    scene = Scene(
+        light, push, topology("ring", 6), nodes=[{"oscillator": heavy, "at": [1, 4]}], initial={"x": 1.0, "y": 0.5}
+    )
+    result = cluster_exponents(scene, (0, 1, 1, 0, 1, 1), transient=20, periods=60, precision=1e-9)
+    w = np.array([[float(abs(i - j) in (1, 5)) for j in range(6)] for i in range(6)])
+    rates = np.diag([-0.5, -1, -1, -0.5, -1, -1]) + 0.1 * w + 0.1 * np.eye(6)  # each node has two links
+    # differences: opposite heavy bodies with the light pairs on their sides, and light ones within a pair
+    expected = []
+    for vectors in ([[1, 0, 0, -1, 0, 0], [0, 1, -1, 0, -1, 1]], [[0, 1, 1, 0, -1, -1]], [[0, 1, -1, 0, 1, -1]]):
+        basis = np.linalg.qr(np.array(vectors, dtype=float).T)[0]
+        expected.append(np.linalg.eigvalsh(basis.T @ rates @ basis).max())
+    assert sorted(result.exponent) == pytest.approx(sorted(expected), abs=1e-6)
+    assert np.isinf(result.separation[0, 1])
+    assert result.merged == result.approaching == ()
+
+
+@pytest.mark.filterwarnings("ignore:coupling")
+def test_links_without_a_sum_of_weights_are_refused() -> None:
     equations = damped(PAIR, 0.1).equations
-    edge = equations.edge
-    assert edge is not None
-    gap = edge.there[1] - edge.here[1]
-    push = edge.parameters[0] * edge.weight * (gap + gap**3)
-    bent = Edge(edge.here, edge.there, edge.weight, (sp.S.Zero, push), edge.parameters)
-    with pytest.raises(ValueError, match="has a derivative that depends on the states it joins"):
-        clustered(Equations.of_equal_nodes(equations.node, bent, 2, equations.links), clusters(PAIR, (0, 0)))
     with pytest.raises(ValueError, match="these equations have no coupling"):
         clustered(Equations.of_equal_nodes(equations.node, None, 2), clusters(PAIR, (0, 0)))
+    squared = Rates({"x": "g*W**2*(x_j - x_i)"}, {"g": 0.3})
+    with pytest.raises(ValueError, match="is not proportional to its weight"):
+        cluster_exponents(Scene("rossler", squared, PAIR), (0, 0))
+    with pytest.raises(ValueError, match="nodes 1 and 2 of one class feel the weights 1 and 0 of their class"):
+        cluster_exponents(Scene(NODE, SYNAPSE, from_matrix([[-2, 1, 1], [0, -1, 1], [1, 1, -2]])), (0, 0, 1))
+    with pytest.raises(ValueError, match="nodes 1 and 2 of one class are of different kinds"):
+        cluster_exponents(Scene(NODE, COMMON, PAIR, nodes=[{"oscillator": OTHER, "at": [1]}]), (0, 0))
+    with pytest.raises(ValueError, match="nodes 1 and 2 of one cluster differ in a; expected equal nodes"):
+        cluster_exponents(Scene(NODE, SPRING, PAIR, parameters={"a": [1, 2]}), (0, 0))
 
 
 def test_what_is_refused() -> None:
