@@ -40,6 +40,11 @@ ALIKE = 1e-5
 equations."""
 
 
+MULTIPLIER = 1e-3
+"""Multipliers of one cycle differ by less than MULTIPLIER times the largest entry of the propagator; the square root of
+an error of 1e-6, as multipliers depend on it where two of them meet."""
+
+
 class Motion(StrEnum):
     """Kind of motion on an attractor.
 
@@ -86,6 +91,18 @@ class Attractor:
         with np.errstate(invalid="ignore"):
             apart = np.where(exponents == exponents[1], 0.0, np.abs(exponents - exponents[1]))
         return exponents[1], apart.max(axis=0)
+
+    def same_multipliers(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """Return where two rows of exponents (m,) on this cycle have the same largest multiplier (m,).
+
+        The difference may be MULTIPLIER times the largest entry of the propagator. A fixed point has no multipliers.
+        """
+        if self.propagators is None or self.cycle == 0.0:
+            return np.zeros(len(first), dtype=bool)
+        shift = np.broadcast_to(self.logarithms, self.propagators.shape[:2])[1]
+        with np.errstate(over="ignore", invalid="ignore"):
+            apart = np.abs(np.exp(first * self.cycle - shift) - np.exp(second * self.cycle - shift))
+        return np.asarray(apart <= MULTIPLIER * np.abs(self.propagators[1]).max(axis=(-2, -1)))
 
     def resolution(self) -> np.ndarray:
         """Return the largest difference (m,) between the exponents of two starts on this attractor.

@@ -120,7 +120,7 @@ class Exponents(Labelled):
         return (
             ("strengths", f"{len(self.alpha)}, {range_text(self.alpha)}"),
             *stable,
-            *exponent_rows(self.exponent, self.stderr, [a.kind for a in self.attractors], self.time),
+            *exponent_rows(self.exponent, self.stderr, self.motions, self.time, at_zero=self.error_at_zero),
             *self.accuracy,
         )
 
@@ -132,16 +132,41 @@ class Exponents(Labelled):
 
     @property
     def accuracy(self) -> tuple[tuple[str, str], ...]:
-        """Rows of a summary: undecided signs, the largest error if it exceeds the precision, and the unit of time."""
+        """Rows of a summary: undecided signs, errors above the precision, and the unit of time."""
         rows: list[tuple[str, str]] = []
         if self.undecided:
             rows.append(("undecided for alpha", interval_text(self.undecided)))
-        worst = float(np.max(self.stderr, initial=0.0))
-        if self.precision and worst > self.precision:
-            rows.append(("errors", f"up to {worst:.2g}; precision = {self.precision:g} was not reached; raise periods"))
+        # far below zero the error matters little: an exponent that dips has a large one
+        at_zero = self.error_at_zero
+        error = float(np.max(self.stderr, initial=0.0)) if at_zero is None else at_zero
+        if self.precision and error > self.precision:
+            where = "" if at_zero is None else " where the exponent passes zero"
+            averaged = not self.groups or self.attractors[0].propagators is None
+            remedy = "raise periods" if averaged else "lower rtol"
+            rows.append(
+                ("errors", f"up to {error:.2g}{where}; precision = {self.precision:g} was not reached; {remedy}")
+            )
         if self.unit:
             rows.append(("unit", self.unit))
         return tuple(rows)
+
+    @property
+    def error_at_zero(self) -> float | None:
+        """Largest standard error beside the zeros on a line of strengths; None without a zero."""
+        if not self.on_a_line:
+            return None
+        changes = np.flatnonzero(np.diff(self._judged[1]))
+        return float(np.max(self.stderr[[changes, changes + 1]])) if len(changes) else None
+
+    @property
+    def motions(self) -> tuple[str, ...]:
+        """Kind of motion of each start; further motions of one kind are numbered, as "periodic (motion 2)"."""
+        kinds = [attractor.kind for attractor in self.attractors]
+        for k, group in enumerate(self.groups):
+            same = sum(self.attractors[other[0]].kind == kinds[group[0]] for other in self.groups[:k])
+            for start in group if same else ():
+                kinds[start] = f"{kinds[start]} (motion {same + 1})"
+        return tuple(kinds)
 
     @property
     def on_a_line(self) -> bool:
@@ -225,14 +250,24 @@ class Exponents(Labelled):
 
 
 def exponent_rows(
-    exponent: np.ndarray, stderr: np.ndarray, attractors: Sequence[str], time: float, period: float | None = None
+    exponent: np.ndarray,
+    stderr: np.ndarray,
+    attractors: Sequence[str],
+    time: float,
+    period: float | None = None,
+    at_zero: float | None = None,
 ) -> tuple[tuple[str, str], ...]:
-    """Return rows of a summary: sizes of exponents, the attractor of each start, and the average."""
+    """Return rows of a summary: sizes of exponents, the attractor of each start, and the average.
+
+    `at_zero`: largest standard error beside the zeros of the exponent.
+    """
     kinds = (f"{kind} ({n} of {len(attractors)} starts)" for kind, n in Counter(attractors).most_common())
     drive = f" ({time / period:.0f} drive periods)" if period else ""
     length = f"{time:.6g} units of time{drive} for each start" if time else "not needed"
     worst = float(np.max(stderr, initial=0.0))
     error = f"largest standard error {worst:.2g}" if math.isfinite(worst) else "too short for an error: raise periods"
+    if at_zero is not None and math.isfinite(worst):
+        error = f"standard error {at_zero:.2g} where the exponent passes zero, at most {worst:.2g}"
     return (
         ("smallest, largest", f"{with_error(exponent.min())}, {with_error(exponent.max())} per unit of time"),
         ("attractor", "; ".join(kinds)),
@@ -406,7 +441,9 @@ def along(
     groups = group_by_attractor(attractors, by_start, error)
     first = list(groups[0])
     if len(groups) > 1:
-        others = ", ".join(dict.fromkeys(attractors[group[0]].kind for group in groups[1:]))
+        own = attractors[0].kind
+        kinds = dict.fromkeys(attractors[group[0]].kind for group in groups[1:])
+        others = ", ".join(f"{kind} with other exponents" if kind == own else kind for kind in kinds)
         warn(
             f"exponents: found {starts - len(first)} of {starts} starts on another motion than the scene's own start "
             f"({others}); expected one motion; the exponents are those of the scene's own, by_start has all"
@@ -482,7 +519,9 @@ def group_by_attractor(
     """Group the starts by attractor; the first group contains the first start.
 
     Two starts are on one attractor if their motions are of one kind and their exponents `by_start` (starts, m) agree
-    within an error. The error is `Attractor.resolution` for cycles and fixed points, and APART errors for averages.
+    within an error. The error is `Attractor.resolution` for cycles and fixed points, and APART errors for averages. On
+    cycles it suffices that the multipliers agree: an exponent dips where a multiplier passes zero, and depends there on
+    the last digits of the orbit.
     """
     groups: list[list[int]] = []
     for row, attractor in enumerate(attractors):
@@ -490,7 +529,8 @@ def group_by_attractor(
             first = others[0]
             alike = attractors[first].kind == attractor.kind
             if alike and attractor.propagators is not None:
-                alike = np.allclose(by_start[first], by_start[row], rtol=1e-3, atol=attractor.resolution())
+                close = np.isclose(by_start[first], by_start[row], rtol=1e-3, atol=attractor.resolution())
+                alike = bool(np.all(close | attractor.same_multipliers(by_start[first], by_start[row])))
             elif alike and attractor.motion is Motion.APERIODIC:
                 both = APART * np.hypot(error[first], error[row])
                 alike = not np.any(np.abs(by_start[first] - by_start[row]) > both)

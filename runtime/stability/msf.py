@@ -147,7 +147,7 @@ class MSF(Labelled):
             ("negative for alpha", fine.negative),
             *[("sigma", text) for text in sigma or ["none"]],
             *possible,
-            *exponent_rows(fine.exponent, fine.stderr, self.attractors, fine.time, self.scene.period),
+            *exponent_rows(fine.exponent, fine.stderr, fine.motions, fine.time, self.scene.period, fine.error_at_zero),
             *fine.accuracy,
         ]
         if any("..." in text for _, text in rows):

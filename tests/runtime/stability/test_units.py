@@ -9,6 +9,8 @@ import pytest
 
 from synchain.models import Field, Scene, chain
 from synchain.runtime import MSF, Exponents, exponents, msf, plane
+from synchain.runtime.stability.attractor import Attractor, Motion
+from synchain.runtime.stability.exponents import group_by_attractor
 
 VAN_DER_POL = Field(
     {"x": "k*v/w", "v": "k*((1 - ((x - c)/s)**2)*v - w*(x - c))"}, parameters={"s": 1.0, "c": 0.0, "k": 1.0, "w": 1.0}
@@ -105,7 +107,41 @@ def test_the_end_beside_an_undecided_stretch_may_lie_anywhere_within() -> None:
 def test_an_average_that_ends_short_of_its_precision_says_so() -> None:
     alpha = np.linspace(0.0, 1.0, 3)
     function = Exponents(alpha, alpha - 0.5, np.full(3, 1.7e-3), 1.0, 1, (alpha - 0.5)[None], precision=1e-3)
-    assert dict(function.summary)["errors"] == "up to 0.0017; precision = 0.001 was not reached; raise periods"
+    assert (
+        dict(function.summary)["errors"]
+        == "up to 0.0017 where the exponent passes zero; precision = 0.001 was not reached; raise periods"
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert "errors" not in dict(Exponents(alpha, alpha, alpha, 1.0, 1, alpha[None], precision=2.0).summary)
+
+
+def test_a_large_error_far_below_zero_is_no_alarm() -> None:
+    """The exponent passes zero between the first two strengths, and dips at the last, where its error is large."""
+    value, error = np.array([0.1, -0.1, -2.0]), np.array([2e-4, 3e-4, 0.13])
+    rows = dict(Exponents(np.arange(3.0), value, error, 1.0, 1, value[None], precision=1e-3).summary)
+    assert "errors" not in rows
+    assert rows["average"].endswith("standard error 0.0003 where the exponent passes zero, at most 0.13")
+    rows = dict(Exponents(np.arange(3.0), value, error * 1e2, 1.0, 1, value[None], precision=1e-3).summary)
+    assert rows["errors"].startswith("up to 0.03 where the exponent passes zero; precision = 0.001")
+
+
+def test_two_motions_of_one_kind_are_told_apart_in_the_summary() -> None:
+    cycle, other = Attractor(Motion.PERIODIC, 2.0), Attractor(Motion.PERIODIC, 3.0)
+    value = np.array([-0.1])
+    by_start = np.array([[-0.1], [-0.2], [-0.1]])
+    result = Exponents(np.ones(1), value, value * 0, 1.0, 3, by_start, (cycle, other, cycle), ((0, 2), (1,)))
+    assert dict(result.summary)["attractor"] == "periodic (2 of 3 starts); periodic (motion 2) (1 of 3 starts)"
+
+
+def test_starts_on_one_cycle_are_one_motion_where_an_exponent_dips() -> None:
+    """Propagators [[0, 1], [d, 0]] with d = 1e-9 and 4e-9 near a zero of the multiplier: the exponents differ by ln 2."""
+    first, second = (
+        Attractor(Motion.PERIODIC, 1.0, np.tile([[0.0, 1.0], [d, 0.0]], (3, 1, 1, 1))) for d in (1e-9, 4e-9)
+    )
+    by_start = np.array([each.exponents()[0] for each in (first, second)])
+    assert by_start[1] - by_start[0] == pytest.approx(np.log(2))
+    assert group_by_attractor((first, second), by_start, np.zeros((2, 1))) == ((0, 1),)
+    far = Attractor(Motion.PERIODIC, 1.0, np.tile([[0.0, 1.0], [1e-2, 0.0]], (3, 1, 1, 1)))
+    by_start[1] = far.exponents()[0]
+    assert group_by_attractor((first, far), by_start, np.zeros((2, 1))) == ((0,), (1,))
