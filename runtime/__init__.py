@@ -33,9 +33,10 @@ from typing import TYPE_CHECKING, Any
 from synchain.models.inputs.keywords import public
 
 if TYPE_CHECKING:
-    from .bifurcation.branches import Branch, follow
+    from .bifurcation.branches import follow
     from .bifurcation.equilibrium import Equilibrium, equilibrium
     from .bifurcation.periodic import PeriodicOrbit, periodic_orbit
+    from .bifurcation.results import Bifurcation, Branch
     from .bifurcation.skeleton import Skeleton, skeleton
     from .engines.scene_kernels import kernel
     from .results.open import open_result
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
 __all__ = [
     "MSF",
     "Basin",
+    "Bifurcation",
     "Branch",
     "ClusterExponents",
     "Criterion",
@@ -102,7 +104,8 @@ __all__ = [
 
 _HOMES = {
     "Basin": "synchronisation.basin",
-    "Branch": "bifurcation.branches",
+    "Bifurcation": "bifurcation.results",
+    "Branch": "bifurcation.results",
     "ClusterExponents": "stability.cluster_exponents",
     "Criterion": "synchronisation.criterion",
     "Equilibrium": "bifurcation.equilibrium",

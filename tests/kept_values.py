@@ -10,12 +10,11 @@ from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.models.symmetries.clusters import clusters
-from synchain.runtime.bifurcation.bifurcations import Bifurcation
-from synchain.runtime.bifurcation.branches import Branch
 from synchain.runtime.bifurcation.equilibrium import Equilibrium
 from synchain.runtime.bifurcation.kinds import BifurcationKind
 from synchain.runtime.bifurcation.periodic import PeriodicOrbit
 from synchain.runtime.bifurcation.phases import Phases
+from synchain.runtime.bifurcation.results import Bifurcation, Branch
 from synchain.runtime.bifurcation.skeleton import Skeleton
 from synchain.runtime.results.labelled import Labelled
 from synchain.runtime.stability.attractor import Attractor, Motion
@@ -55,7 +54,7 @@ def branch() -> Branch:
     omegas = np.array([1.1, 1.2, 1.3])
     turn = Bifurcation(1.25, BifurcationKind.GRAZING, 1e-9, orbit_at(1.25))
     phases = tuple(Phases((0, 1), gap, np.inf) for gap in (0.1, 0.2, 0.3))
-    return Branch("omega", omegas, tuple(orbit_at(x) for x in omegas), (turn,), phases)
+    return Branch("omega", omegas, tuple(orbit_at(x) for x in omegas), (turn,), np.zeros(3, int), omegas, phases)
 
 
 def swept(x: np.ndarray, low: float, high: float) -> Sweep:

@@ -652,7 +652,7 @@ def orbit_of(found: Any) -> Quantities:
 @scene("periodic orbit of friction and its branch")
 def _() -> Quantities:
     found = periodic_orbit(Scene(transient=60.0), 2, omega=1.15)
-    branch = follow(Scene(), "omega", [1.15, 1.155, 1.16], found)
+    branch = follow(found, "omega", values=[1.15, 1.155, 1.16])
     return orbit_of(found) | {
         "branch": np.array([orbit.state for orbit in branch.orbits]),
         "branch multipliers": np.array([orbit.multipliers for orbit in branch.orbits]),

@@ -50,7 +50,6 @@ TAKEN = {
     "lyapunov_spectrum": ORBITS - {"workers"},
     "equilibrium": {"parameters"},
     "periodic_orbit": {"parameters", "periods"},
-    "follow": {"show_progress", "progress", "parameters"},
     "skeleton": {"show_progress", "progress", "parameters", "seed", "transient", "periods"},
 }
 """What each function that computes takes of the shared keywords."""
@@ -78,12 +77,11 @@ def test_the_shared_keywords_have_the_same_names_and_defaults(name: str) -> None
 
 def test_every_function_that_computes_is_in_the_table() -> None:
     functions = {name for name in runtime.__all__ if inspect.isfunction(getattr(runtime, name))}
-    assert functions - {"kernel", "open_result", "merge"} == set(TAKEN)
+    assert functions - {"kernel", "open_result", "merge", "follow"} == set(TAKEN)
 
 
 def calls(scene: Scene, path: Any) -> dict[str, Callable[..., object]]:
     """Each function with what it cannot do without."""
-    first = runtime.PeriodicOrbit(scene, 1, np.zeros(2), np.zeros(2), 0.0, 0)
     return {
         "run": lambda **keywords: runtime.run(scene, **keywords),
         "stream": lambda **keywords: runtime.stream(scene, path, **keywords),
@@ -98,7 +96,6 @@ def calls(scene: Scene, path: Any) -> dict[str, Callable[..., object]]:
         "lyapunov_spectrum": lambda **keywords: runtime.lyapunov_spectrum(scene, **keywords),
         "equilibrium": lambda **keywords: runtime.equilibrium(scene, **keywords),
         "periodic_orbit": lambda **keywords: runtime.periodic_orbit(scene, **keywords),
-        "follow": lambda **keywords: runtime.follow(scene, "omega", [1.3], first, **keywords),
         "skeleton": lambda **keywords: runtime.skeleton(scene, "omega", [1.3], **keywords),
     }
 
@@ -131,10 +128,10 @@ def test_every_function_refuses_in_one_line_what_is_no_parameter(name: str, tmp_
         *((n, w, "one orbit") for n in ("cluster_exponents", "lyapunov_spectrum") for w in ("workers", "executor")),
         *(
             (n, w, "needs the one before")
-            for n in ("equilibrium", "periodic_orbit", "follow", "skeleton")
+            for n in ("equilibrium", "periodic_orbit", "skeleton")
             for w in ("workers", "executor")
         ),
-        *((name, "rtol", "rtol = 1e-12") for name in ("periodic_orbit", "follow", "skeleton")),
+        *((name, "rtol", "rtol = 1e-12") for name in ("periodic_orbit", "skeleton")),
         *(
             (n, w, rf"Criterion\({w}=…\)")
             for n in ("thresholds", "universal_probe")
@@ -279,10 +276,8 @@ def test_branches_follow_parameters_with_the_names_of_keywords() -> None:
     node = Field({"x": "v", "v": "-x - v + start*cos(omega*t)"}, parameters={"start": 0.5, "omega": 1.0})
     scene = Scene(node, "x->x", transient=30.0)
     first = runtime.periodic_orbit(scene, parameters={"start": 0.1})
-    branch = runtime.follow(scene, "start", [0.1, 0.2], first, show_progress=False)
+    branch = runtime.follow(first, "start", values=[0.1, 0.2])
     np.testing.assert_allclose([orbit.state[1] for orbit in branch.orbits], [0.1, 0.2], atol=1e-9)
-    with pytest.raises(ValueError, match="follow: 'start' takes its values one after the other; expected others"):
-        runtime.follow(scene, "start", [0.1, 0.2], first, parameters={"start": 0.3})
 
 
 def test_mapping_and_keywords_say_the_same() -> None:
@@ -313,10 +308,6 @@ def test_progress_of_orbits_counts_periods_and_values() -> None:
         call()
         assert (heard[0].done, heard[-1].done, heard[-1].total, heard[-1].unit) == (0, 30, 30, "period")
         assert [p.done for p in heard] == sorted({p.done for p in heard})
-    orbit = runtime.periodic_orbit(DRIVEN)
-    heard.clear()
-    runtime.follow(DRIVEN, "omega", [1.3, 1.31, 1.32], orbit, **options)
-    assert [(p.done, p.total, p.unit) for p in heard] == [(k, 3, "value") for k in range(4)]
     heard.clear()
     runtime.skeleton(DRIVEN, "omega", [1.3, 1.31], (1,), 2, **options)
     assert [(p.done, p.total) for p in heard] == [(0, 2), (1, 2), (2, 2)]

@@ -28,7 +28,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -38,6 +38,7 @@ from .continuation import Arc, det, find_turn, turns
 from .kinds import BifurcationKind
 from .periodic import PeriodicOrbit, periodic_orbit, strobe
 from .phases import Phases
+from .results import Bifurcation
 
 Test = Callable[[PeriodicOrbit], float]
 """A test function of the orbit, zero at a bifurcation."""
@@ -69,24 +70,9 @@ REAL = 1e-6
 """Largest imaginary part of a multiplier that passes the circle at -1 or 1 (a choice)."""
 
 
-@dataclass(frozen=True, slots=True)
-class Bifurcation:
-    """A bifurcation on a branch of periodic orbits."""
-
-    value: float  # value of the parameter
-    kind: BifurcationKind
-    # distance of `orbit` from the bifurcation: of the multiplier from -1, from 1 or, for Neimark-Sacker, from the unit
-    # circle; for grazing the gap; for stick loss the excess of the load. `follow` accepts at most 1e-6
-    residual: float
-    orbit: PeriodicOrbit = field(repr=False)  # nearest orbit to the bifurcation
-
-    def __repr__(self) -> str:
-        return f"Bifurcation({self.kind} at {self.value:.8g}, residual {self.residual:.1e})"
-
-    @property
-    def located(self) -> bool:
-        """Whether the residual is small enough for a bifurcation."""
-        return self.residual < LOCATED
+def located(bifurcation: Bifurcation) -> bool:
+    """Return whether the residual is small enough for a bifurcation."""
+    return bifurcation.residual < LOCATED
 
 
 def bifurcations_between(arc: Arc, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> list[Bifurcation]:
@@ -119,11 +105,11 @@ def bifurcations_at_end(arc: Arc, beyond: float, final: bool) -> list[Bifurcatio
     if turn is not None and (beyond - turn[1]) * (turn[1] - arc.values[-1]) >= 0.0:
         kind, at, orbit = turn
         bifurcation = Bifurcation(at, kind, _residual(orbit, kind), orbit)
-        return [bifurcation] if bifurcation.located else []
+        return [bifurcation] if located(bifurcation) else []
     if arc.phases[-1] is None or not final:
         return []
     graze = _graze(arc.copy(), beyond)
-    return [graze] if graze.located else []
+    return [graze] if located(graze) else []
 
 
 def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
@@ -142,7 +128,7 @@ def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
         crossings = _crossings(OrbitPair(single, (single.values[0], beyond), (single.orbits[0], single.orbits[1])))
     except ArithmeticError:
         return None
-    return next((each for each in crossings if each.kind is BifurcationKind.PERIOD_DOUBLING and each.located), None)
+    return next((each for each in crossings if each.kind is BifurcationKind.PERIOD_DOUBLING and located(each)), None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,179 +1,77 @@
-"""Follow branches of periodic orbits along a parameter, and locate the bifurcations on each branch.
+"""Follow equilibria and periodic orbits along a parameter.
 
-A smooth bifurcation is a multiplier that passes the unit circle: at -1, at 1, or in a complex pair.  A bifurcation of
-friction is a change of the phases of stick and slip.  In grazing, a phase begins in the middle of another phase, where
-a margin becomes zero.  In stick loss, a body that landed in stick turns at once, as the load at the landing passes the
-limit of static friction.  `synchain.runtime.bifurcation.bifurcations` locates them.
-
-The tracer doubles its step after each orbit. It halves a step if no orbit fits the arc, if a bifurcation on the step is
-not located, or if phases change on a long step. After refused steps, it looks for a bifurcation that ends the branch.
-
-Sources: as `synchain.runtime.bifurcation.continuation`; di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth
-Dynamical Systems (Springer, 2008), chapters 7-8, for friction.
+`follow` chooses the problem that belongs to a solution or bifurcation, `arclength` steps along its branch, `detection`
+finds the bifurcations on each step.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from numbers import Real
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
-import xarray as xr
 
-from synchain.models.inputs.checks import check_instance, short_repr
+from synchain.models.inputs.checks import check_number, listed, short_repr, typed_repr
 from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.names import expect_free
 from synchain.models.scenes.scene import Scene
 
-from ..cells.run_keywords import Given
-from ..results.labelled import Labelled, dataset
-from ..support.error_text import range_text
-from ..support.execution import Execution
-from ..support.progress import Hook
-from .bifurcations import Bifurcation, bifurcations_at_end, bifurcations_between
-from .continuation import Arc
-from .periodic import NEWTON, PeriodicOrbit, periodic_orbit, relative
-from .phases import Phases
+from .arclength import Limits, Point, correct, walk
+from .detection import Located, bifurcations
+from .equilibria import Equilibria
+from .equilibrium import Equilibrium, resting_equations
+from .kinds import BifurcationKind
+from .normal_forms import first_lyapunov_coefficient
+from .orbit_tracer import checked_values, traced
+from .periodic import PeriodicOrbit
+from .results import NAMES, Bifurcation, Branch, digits_of
+from .switching import directions
 
-LONGEST = 1.0 / 4.0
-"""Longest step, relative to the range of the parameter (a choice)."""
+FIRST_STEP, LARGEST_STEP = 0.01, 0.05
+"""First and largest step, in parts of the range of the parameter and of the size of the states (choices)."""
 
-SHORT = 1.0 / 32.0
-"""Length of a refused step, relative to the range or to the last such step, at which the branch's end is sought (a
-choice)."""
+MOST = 1000
+"""Most solutions in each direction (a choice)."""
 
-SHORTEST = 2.0**-20
-"""Shortest step, relative to the range; if it is refused too, the branch is lost (a choice)."""
-
-APART = 1.0 / 64.0
-"""Longest step, relative to the range, in which a change of phases is located; two changes in one count as one (a
-choice)."""
-
-FAR = 0.3
-"""Largest distance from the expected state, relative to the step, of an orbit of other phases on the same branch (a
-choice)."""
-
-KINK = 1e-2
-"""Distance from the expected state that such an orbit may always have, relative to its extent: a change of phases is a
-kink of
-the branch (a choice)."""
-
-NAMES = frozenset(
-    {
-        "bifurcation",
-        "bifurcation_kind",
-        "branch",
-        "multipliers",
-        "number",
-        "orbit",
-        "periods",
-        "stable",
-        "state",
-        "turn",
-    }
-)
-"""Names in the data of branches and skeletons, which no parameter may have, beside those of all results."""
-
-
-@dataclass(frozen=True, slots=True, repr=False)
-class Branch(Labelled):
-    """Periodic orbits along a parameter.
-
-    The branch ends if no further orbit can be found, usually at a fold or a graze. It is lost if neither an
-    orbit nor a bifurcation at which it ends is found.
-
-    Parameters
-    ----------
-    name : str
-        Name of the parameter.
-    values : ndarray, shape (k,)
-        Values of the parameter.
-    orbits : tuple of PeriodicOrbit
-        Orbit at each value.
-    bifurcations : tuple of Bifurcation
-        Bifurcations between the orbits and at the end.
-    phases : tuple of Phases
-        Phases of each orbit; empty for friction that is not set-valued.
-    lost : tuple of float
-        Values of the parameter at the ends where the branch is lost.
-    """
-
-    name: str
-    values: np.ndarray
-    orbits: tuple[PeriodicOrbit, ...]
-    bifurcations: tuple[Bifurcation, ...]
-    phases: tuple[Phases, ...] = ()
-    lost: tuple[float, ...] = ()
-
-    @property
-    def data(self) -> xr.Dataset:
-        """States and multipliers along the parameter, and the bifurcations."""
-        turns = self.bifurcations
-        return dataset(
-            {
-                "state": ((self.name, "component"), [o.state for o in self.orbits], "state at the start of a period"),
-                "multipliers": ((self.name, "number"), [o.multipliers for o in self.orbits], "Floquet multipliers"),
-                "stable": ((self.name,), [o.stable for o in self.orbits], "whether all multipliers lie in the circle"),
-                "bifurcation": (("turn",), np.array([t.value for t in turns], dtype=float), f"values of {self.name}"),
-                "bifurcation_kind": (("turn",), np.array([str(t.kind) for t in turns], dtype=str), "their kinds"),
-            },
-            {self.name: self.values, "component": list(self.orbits[0].components)},
-            self.orbits[0].scene,
-        )
-
-    @property
-    def summary(self) -> tuple[tuple[str, str], ...]:
-        """Rows of orbits with their stability, of the bifurcations, and of the ends where the branch is lost."""
-        stable = sum(orbit.stable for orbit in self.orbits)
-        turns = "; ".join(f"{turn.kind} at {turn.value:.8g}" for turn in self.bifurcations)
-        return (
-            (
-                "orbits",
-                f"{len(self.orbits)} of {self.orbits[0].periods} drive periods, {stable} stable for one oscillator",
-            ),
-            (self.name, range_text(self.values)),
-            ("bifurcations", turns or "none"),
-            *((("lost", f"at {digits_of(self.lost)}"),) if self.lost else ()),
-        )
+Direction = Literal["both", "up", "down"]
 
 
 def follow(
-    scene: Scene,
+    first: Equilibrium | PeriodicOrbit | Bifurcation,
     name: str,
-    values: Sequence[float] | np.ndarray,
-    first: PeriodicOrbit,
     *,
-    show_progress: bool | None = None,
-    progress: Hook | None = None,
-    parameters: Mapping[str, float] | None = None,
-    **more: float,
+    to: float | None = None,
+    values: Sequence[float] | np.ndarray | None = None,
+    within: tuple[float, float] | None = None,
+    direction: Direction = "both",
+    largest_step: float | None = None,
+    vector: int = 0,
 ) -> Branch:
-    """Follow a periodic orbit along a parameter and locate its bifurcations.
+    """Follow an equilibrium or a periodic orbit along a parameter, through folds, and locate its bifurcations.
 
-    The branch alone determines the steps; `values` select the orbits that are returned. A step is halved if the orbit
-    does not fit the tangents of the branch, if a multiplier moves far, or if a bifurcation on it has a residual above
-    1e-6.
+    The branch is followed by its arclength: stable and unstable solutions, and both sides of a fold.  It ends on the
+    bounds of the parameter.
 
     Parameters
     ----------
-    scene : Scene
-        Scene of the orbit.
+    first : Equilibrium, PeriodicOrbit or Bifurcation
+        Where the branch begins.  From a branch point the other branch is followed, from a fold both sides.
     name : str
         Name of the parameter.
-    values : array_like, shape (k,)
-        Monotonic values of the parameter.
-    first : PeriodicOrbit
-        Orbit at or near values[0].
-    show_progress : bool, optional
-        Whether to show a bar; by default a bar on terminals and in notebooks, a line a minute elsewhere.
-    progress : callable, optional
-        Is called with a `Progress`, which counts values of the parameter.
-    parameters : mapping of str to float, optional
-        Other parameters of the scene to set, for names that are keywords already.
-    **more : float
-        Other parameters of the scene to set.
+    to : float, optional
+        Follow from the value of `first` towards this one and end there, or where the branch returns to its beginning.
+    values : array_like, shape (k,), optional
+        Values of the parameter at which solutions are added to those of the steps.
+    within : (float, float), optional
+        Bounds of the parameter; by default `to`, `values` and the value of `first` set them.
+    direction : {"both", "up", "down"}
+        Which way the parameter goes at the beginning; `to` decides it if it is given.
+    largest_step : float, optional
+        Largest step of the parameter; by default a twentieth of the bounds.
+    vector : int
+        Which of the vectors of a branch point is followed; see `Bifurcation.vectors`.
 
     Returns
     -------
@@ -182,43 +80,231 @@ def follow(
     Warns
     -----
     RuntimeWarning
-        If the branch is lost: the orbits end without a bifurcation.
+        If the branch is lost: the solutions end without a bifurcation.
 
     Raises
     ------
     ValueError
-        If the parameter is unknown, if the values are not monotonic, and for the cycle of an undriven oscillator.
+        If the parameter is unknown, if nothing bounds it, if rates jump or time enters the equations of an equilibrium.
     TypeError
-        If `first` is no PeriodicOrbit.
+        If `first` is none of these values.
     ArithmeticError
-        If there is no orbit near `first` at values[0].
+        If there is no solution near `first`.
 
     See Also
     --------
+    equilibrium : Find the first equilibrium.
     periodic_orbit : Find the first orbit.
-    skeleton : Find orbits by a search, and follow all of them.
 
     Examples
     --------
-    The large oscillation of Duffing's oscillator ends at a fold above its resonance:
+    Two machines of a power grid: beyond P/K = 1 there is no equilibrium.
 
-    >>> from synchain import Field, Scene, follow, periodic_orbit
-    >>> duffing = Field({"x": "v", "v": "-x - x**3 - v/10 + 0.3*cos(w*t)"}, parameters={"w": 1.2})
-    >>> scene = Scene(duffing, None, initial={"x": 0.5, "v": 0}, transient=100)
-    >>> branch = follow(scene, "w", [1.2, 1.6, 2.0], periodic_orbit(scene))
-    >>> [(str(each.kind), round(each.value, 6)) for each in branch.bifurcations]
-    [('fold', 1.77972)]
+    >>> from synchain import Field, Rates, Scene, chain, equilibrium, follow
+    >>> machine = Field({"delta": "w", "w": "P - w/2"}, parameters={"P": 0})
+    >>> line = Rates({"w": "K*W*sin(delta_j - delta_i)"}, {"K": 1})
+    >>> rest = equilibrium(Scene(machine, line, chain(2), parameters={"P": [0.5, -0.5]}))
+    >>> branch = follow(rest, "K", to=0.1)
+    >>> [(str(each.kind), round(each.value, 9)) for each in branch.bifurcations]
+    [('fold', 0.5)]
     """
-    check_instance("first", first, PeriodicOrbit, "a PeriodicOrbit, such as periodic_orbit(scene) returns")
+    if not isinstance(first, Equilibrium | PeriodicOrbit | Bifurcation):
+        raise TypeError(
+            f"follow: first: found {typed_repr(first)}; expected an Equilibrium, PeriodicOrbit or Bifurcation"
+        )
+    solution = first.solution if isinstance(first, Bifurcation) else first
+    scene = solution.scene
+    _check_name(scene, name)
+    if isinstance(first, Bifurcation) and first.kind is BifurcationKind.HOPF:
+        raise ValueError(
+            "follow: found a Hopf point; expected an equilibrium, a fold or a branch point; its `solution` is the equilibrium"
+        )
+    if not isinstance(solution, Equilibrium):
+        return _along_orbits(solution, name, to, values)
+    bounds, requested = _bounds(scene, name, to, values, within)
+    begin = scene.parameters[name]
+    # The range of the parameter is its unit of length.
+    size = (
+        max(bounds[1] - bounds[0], abs(bounds[0] - begin), abs(bounds[1] - begin)) if np.isfinite(bounds).all() else 0.0
+    )
+    size = size or abs(begin) or 1.0
+    largest = LARGEST_STEP if largest_step is None else check_number("largest_step", largest_step, 0.0) / size
+    limits = Limits((bounds,), MOST, min(FIRST_STEP, largest), largest, requested)
+    if direction not in ("both", "up", "down"):
+        raise ValueError(f"direction: found {direction!r}; expected 'both', 'up' or 'down'")
+    if to is not None:
+        direction = "up" if to > begin else "down"
+    signs = {"both": (-1.0, 1.0), "up": (1.0,), "down": (-1.0,)}[direction]
+    parts = []
+    for sign in signs if not _leaves(first) else (-1.0, 1.0):
+        problem = Equilibria(
+            scene, resting_equations("follow", scene), (name,), solution.state, solution.shifts, solution.speeds
+        )
+        problem.set_ranges(np.array([size]))
+        start = _start(problem, first if isinstance(first, Bifurcation) else None, sign, vector)
+        parts.append(_trace(problem, start, limits))
+    return _joined(name, parts)
+
+
+def _check_name(scene: Scene, name: str) -> None:
+    """Raise ValueError for a parameter that is unknown, does not enter, or has the name of something else."""
+    if name not in scene.parameters:
+        raise ValueError(f"follow: unknown parameter {name!r}; known: {listed(scene.parameters)}")
+    if name not in scene.equations.parameters:
+        raise ValueError(
+            f"follow: found {name!r}, which does not enter the equations; expected one of {listed(scene.equations.parameters)}"
+        )
+    expect_free("branch", [name], NAMES)
+
+
+def _bounds(
+    scene: Scene,
+    name: str,
+    to: float | None,
+    values: Sequence[float] | np.ndarray | None,
+    within: tuple[float, float] | None,
+) -> tuple[tuple[float, float], list[float]]:
+    """Return the bounds of a parameter and the values at which solutions are requested."""
+    requested = [] if values is None else checked_values(scene, name, values)
+    begin = scene.parameters[name]
+    if to is not None:
+        to = check_number("to", to)
+        if to == begin:
+            raise ValueError(f"to: found {to!r}, the value of the first solution; expected another value")
+    if within is not None:
+        if len(within) != 2 or not within[0] < within[1]:
+            raise ValueError(f"within: found {short_repr(within)}; expected two numbers, the lower one first")
+        low, high = (check_number("within", each) for each in within)
+        if to is not None:
+            low, high = (low, to) if to > begin else (to, high)
+        if not low <= begin <= high:
+            raise ValueError(f"within: found {name} = {begin:g} of the first solution outside; expected it inside")
+        return (low, high), requested
+    ends = [*requested, *([] if to is None else [to])]
+    if not ends:
+        raise ValueError(f"follow: found no end for {name}; expected to=, values= or within=")
+    return (min(begin, *ends), max(begin, *ends)), requested
+
+
+def _leaves(first: object) -> bool:
+    """Return whether a branch begins at a bifurcation, where it goes to both sides."""
+    return isinstance(first, Bifurcation) and first.kind in (BifurcationKind.BRANCH_POINT, BifurcationKind.FOLD)
+
+
+def _start(problem: Equilibria, first: Bifurcation | None, sign: float, vector: int) -> Point:
+    """Return the first point of a branch with its tangent; without critical values where it leaves a bifurcation."""
+    if first is not None and _leaves(first):
+        if not 0 <= vector < len(first.vectors):
+            raise ValueError(f"vector: found {vector}; expected a number below {len(first.vectors)}")
+        tangent = np.zeros(len(problem.point))
+        tangent[: problem.size] = sign * first.vectors[vector].real
+        return Point(problem.point, tangent / float(np.linalg.norm(problem.weights * tangent)), 0)
+    along = np.zeros(len(problem.point))
+    along[-1] = sign / problem.weights[-1]
+    point = correct(problem, problem.point, along)
+    if point is None:
+        raise ArithmeticError(f"follow: found no solution at {problem.names[-1]} = {problem.point[-1]:g} near `first`")
+    z, tangent = problem.accept(point.z, point.tangent)
+    return Point(z, tangent, 0, problem.critical(z))
+
+
+def _trace(
+    problem: Equilibria, start: Point, limits: Limits
+) -> tuple[list[tuple[Point, Equilibrium]], list[Bifurcation], str]:
+    """Walk along a branch; return its points with their solutions, the bifurcations and how it ends."""
+    steps = walk(problem, start, limits, bifurcations)
+    points = [(start, problem.solution(start))]
+    found: list[Bifurcation] = []
+    while True:
+        try:
+            each = next(steps)
+        except StopIteration as end:
+            return points, found, end.value
+        if isinstance(each, Point):
+            points.append((each, problem.solution(each)))
+        elif isinstance(each, Located):
+            found.append(_bifurcation(problem, each))
+
+
+def _bifurcation(problem: Equilibria, located: Located) -> Bifurcation:
+    """Compute what belongs to a located bifurcation of equilibria."""
+    point, critical = located.point, located.point.critical
+    if critical is None:
+        raise RuntimeError("a bifurcation without critical values")
+    value, block = located.critical, int(critical.blocks[located.index])
+    solution, count = problem.solution(point), located.multiplicity
+    coefficient = math.nan
+    if located.kind is BifurcationKind.HOPF:
+        value = complex(value.real, abs(value.imag))
+        vectors = problem.vectors(point.z, value, count).T
+        # Real and imaginary part of the eigenvector are orthogonal at this phase.
+        vectors = vectors * np.exp(-0.5j * np.angle((vectors**2).sum(axis=1)))[:, None]
+        if count == 1:
+            coefficient = first_lyapunov_coefficient(problem, point.z, vectors[0], value.imag)
+    else:
+        vectors = directions(problem.scene, solution.state, problem.vectors(point.z, 0.0, count))
+    return Bifurcation(
+        point.value,
+        located.kind,
+        abs(critical.growth[located.index]) / critical.scale,
+        solution,
+        problem.names[-1],
+        point.length,
+        value,
+        count,
+        vectors.astype(complex),
+        problem.blocks.text(block) if problem.blocks is not None and block >= 0 else "",
+        coefficient,
+    )
+
+
+def _joined(name: str, parts: list[tuple[list[tuple[Point, Equilibrium]], list[Bifurcation], str]]) -> Branch:
+    """Return the branch of the parts that were followed in each direction from its first solution."""
+    points, found, ends = parts[-1]
+    both: tuple[str, ...] = (ends,)
+    if len(parts) == 2:
+        behind, found_behind, end_behind = parts[0]
+        points = [(replace(p, length=-p.length), solution) for p, solution in behind[:0:-1]] + points
+        found = [replace(each, length=-each.length) for each in reversed(found_behind)] + found
+        both = (end_behind, ends)
+    lost = tuple(
+        point.value
+        for (point, _), end in zip((points[0], points[-1])[-len(both) :], both, strict=True)
+        if end.startswith("lost")
+    )
+    if lost:
+        warn(
+            f"follow: found no solution and no bifurcation beyond {name} = {digits_of(lost)}; expected the "
+            "branch to go on, or to end at a bifurcation; try a smaller largest_step"
+        )
+    growing = np.array([solution.growing for _, solution in points])
+    return Branch(
+        name,
+        np.array([p.value for p, _ in points]),
+        tuple(solution for _, solution in points),
+        tuple(found),
+        growing,
+        np.array([p.length for p, _ in points]),
+        lost=lost,
+        ends=both,
+    )
+
+
+def _along_orbits(
+    first: PeriodicOrbit, name: str, to: float | None, values: Sequence[float] | np.ndarray | None
+) -> Branch:
+    """Follow a periodic orbit of one oscillator along monotonic values of a parameter."""
     if first.free:
         raise ValueError(
             "first: found the limit cycle of an oscillator without a drive; expected an orbit of a driven one; "
             "periodic_orbit finds cycles value by value"
         )
+    if values is None:
+        if to is None:
+            raise ValueError(f"follow: found no end for {name}; expected to= or values=")
+        values = np.linspace(first.scene.parameters[name], to, 33)
     checked = checked_values(first.scene, name, values)
-    scene = others(Given(follow, parameters, more, NEWTON), scene, name)
-    with Execution(1, None, show_progress, progress).reporter(len(checked), "value") as reporter:
-        branch = traced(scene, name, reporter.each(checked), first, abs(checked[-1] - checked[0]))
+    branch = traced(first.scene, name, checked, first, abs(checked[-1] - checked[0]))
     warn_of_lost("follow", [branch])
     return branch
 
@@ -231,135 +317,3 @@ def warn_of_lost(function: str, branches: Sequence[Branch]) -> None:
             f"{function}: found no orbit and no bifurcation beyond {branches[0].name} = {digits_of(lost)}; expected the "
             "branch to go on, or to end at a bifurcation; try a shorter range there, or periodic_orbit beyond"
         )
-
-
-def digits_of(values: Sequence[float]) -> str:
-    """Write numbers with eight digits, separated by commas."""
-    return ", ".join(f"{value:.8g}" for value in values)
-
-
-def others(keywords: Given, scene: Scene, name: str) -> Scene:
-    """Return a scene with other parameters than the one along which a branch is followed."""
-    if name in keywords.values:
-        function = keywords.function.__name__
-        raise ValueError(f"{function}: {name!r} takes its values one after the other; expected others")
-    return keywords.scene(scene)
-
-
-def traced(scene: Scene, name: str, values: Iterable[float], first: PeriodicOrbit, span: float) -> Branch:
-    """Follow a periodic orbit along checked values of a parameter with a range of length `span`, as `follow` does."""
-    tracer = BranchTracer(Arc(scene, name, first.periods, span))
-    orbits: dict[float, PeriodicOrbit] = {}
-    for value in values:
-        if orbits:
-            orbit = tracer.on(value)
-        else:
-            start = periodic_orbit(scene, first.periods, first.state, parameters={name: value})
-            orbit = tracer.take(value, start, start.phases)
-        if orbit is None:
-            break
-        orbits[value] = orbit
-    phases = [tracer.phases[value] for value in orbits]
-    return Branch(
-        name,
-        np.array(list(orbits)),
-        tuple(orbits.values()),
-        tuple(tracer.bifurcations),
-        tuple(each for each in phases if each is not None),
-        tracer.lost,
-    )
-
-
-def checked_values(scene: Scene, name: str, values: Sequence[float] | np.ndarray) -> list[float]:
-    """Check the values (k,) of a parameter: finite, and rising or falling all the way; return them as floats."""
-    if name not in scene.parameters:
-        raise ValueError(f"unknown parameter {name!r}; known: {', '.join(scene.parameters)}")
-    expect_free("branch", [name], NAMES)
-    if not np.iterable(values) or not all(isinstance(value, Real) and math.isfinite(value) for value in values):
-        raise ValueError(f"values: found {short_repr(values)}; expected finite numbers for {name}")
-    checked = [float(value) for value in values]
-    steps = np.diff(checked)
-    if not checked or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
-        raise ValueError(
-            f"values: found {short_repr(checked)}; expected at least one number, rising or falling all the way"
-        )
-    return checked
-
-
-class BranchTracer:
-    """Trace a branch orbit by orbit, from the last orbit of a smooth arc."""
-
-    def __init__(self, arc: Arc) -> None:
-        self.arc = arc
-        self.bifurcations: list[Bifurcation] = []
-        self.phases: dict[float, Phases | None] = {}  # by value of the parameter
-        self.least: int | None = None  # least number of drive periods of all orbits
-        self.lost: tuple[float, ...] = ()
-        self.step = LONGEST * arc.span
-
-    def take(
-        self, value: float, orbit: PeriodicOrbit, phases: Phases | None, crossed: Sequence[Bifurcation] = ()
-    ) -> PeriodicOrbit:
-        """Append an orbit, after the bifurcations that the step to it crosses."""
-        self.phases[value] = phases
-        self.least = self.least or orbit.least
-        if self.arc.values:
-            self.bifurcations += sorted(crossed, key=lambda each: abs(each.value - self.arc.values[-1]))
-            if self._changes(phases):
-                self.arc = self.arc.empty()
-        self.arc.take(value, orbit, phases)
-        return orbit
-
-    def on(self, value: float) -> PeriodicOrbit | None:
-        """Find the orbit at the next value by steps whose length follows the branch alone, None if the branch ends."""
-        span, longest, sought = self.arc.span, np.inf, SHORT * self.arc.span
-        while (last := self.arc.values[-1]) != value:
-            step = min(self.step, longest)
-            length = min(step, abs(value - last))
-            at = value if step >= abs(value - last) else last + math.copysign(step, value - last)
-            next_orbit = self._orbit_on_branch(at)
-            # The next orbit sticks and slips in another order: halve the step until the parameter of the change is bracketed.
-            if next_orbit is not None and length > APART * span and self._changes(next_orbit[1]):
-                longest = 0.5 * length
-                continue
-            # Accept the orbit if every bifurcation on the step is located.
-            crossed = None if next_orbit is None else bifurcations_between(self.arc, at, *next_orbit)
-            if next_orbit is not None and crossed is not None and all(each.located for each in crossed):
-                longest = np.inf if self._changes(next_orbit[1]) else longest
-                self.take(at, *next_orbit, crossed)
-                self.step = max(self.step, min(2.0 * length, LONGEST * span))
-                continue
-            # A refused step: the branch ends within its double, or the step is too long.
-            if length <= max(sought, SHORTEST * span):
-                sought = SHORT * length
-                beyond = value if 2.0 * length > abs(value - last) else last + 2.0 * (at - last)
-                final = length <= SHORTEST * span
-                end = bifurcations_at_end(self.arc, beyond, final)
-                if end or final:
-                    self.bifurcations += end
-                    self.lost = () if end else (last,)
-                    return None
-            self.step = 0.5 * length
-        return self.arc.orbits[-1]
-
-    def _changes(self, phases: Phases | None) -> bool:
-        """Return whether phases differ from those of the last orbit."""
-        last = self.arc.phases[-1]
-        return phases is not None and last is not None and phases.slip_states != last.slip_states
-
-    def _orbit_on_branch(self, value: float) -> tuple[PeriodicOrbit, Phases | None] | None:
-        """Find the orbit at a value and its phases; None if Newton's method finds none, or one of another branch."""
-        try:
-            orbit = self.arc.at(value)
-        except ArithmeticError:
-            return None
-        if self.least not in (None, orbit.least):
-            return None
-        phases = orbit.phases
-        if not self._changes(phases):
-            return (orbit, phases) if self.arc.joins(value, orbit) else None
-        # Orbits of other phases have other tangents: compare with the extrapolated state.
-        expected, last = self.arc.guess(value), self.arc.orbits[-1]
-        allowed = FAR * relative(expected - last.state, last.extent) + KINK
-        near = len(self.arc.values) == 1 or relative(orbit.state - expected, last.extent) < allowed
-        return (orbit, phases) if near else None

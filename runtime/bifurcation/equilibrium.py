@@ -271,29 +271,29 @@ def equilibrium(
     """
     scene = Given(equilibrium, parameters, more, REFUSED).scene(scene)
     scene = scene if start is None else started(scene, start)[0]
-    network, first = Linearised.of(_at_rest(scene), scene.parameters), np.array(scene.y0)
+    network, first = Linearised.of(resting_equations("equilibrium", scene), scene.parameters), np.array(scene.y0)
     count = None if count is None else check_integer("count", count, 1)
     if count is not None and count > len(first):
         raise ValueError(f"count = {count}; expected at most {len(first)}, the states of the network")
     names, shifts = _shifts(scene, network, first)
     state, speeds, residual, steps = _solve(network, first, shifts)
-    eigenvalues = _eigenvalues(network, state, count)
-    eigenvalues[np.abs(eigenvalues) <= LEAST * _fastest(network, first, state)] = 0.0
-    eigenvalues = eigenvalues[np.lexsort((-eigenvalues.imag, -eigenvalues.real))]
-    return Equilibrium(scene, state, eigenvalues, names, speeds, residual, steps)
+    values = eigenvalues(network.jacobian(state), network.mass(state), count)
+    values[np.abs(values) <= LEAST * _fastest(network, first, state)] = 0.0
+    values = values[np.lexsort((-values.imag, -values.real))]
+    return Equilibrium(scene, state, values, names, speeds, residual, steps)
 
 
-def _at_rest(scene: Scene) -> Equations:
+def resting_equations(function: str, scene: Scene) -> Equations:
     """Return the equations without drives of strength zero; ValueError for a drive, set-valued friction or jumps."""
     equations = without_drive(scene.equations, scene.parameters)
     if equations.forced:
         raise ValueError(
-            f"equilibrium: found a drive, time enters the equations of {scene!r}; expected none; `periodic_orbit` finds "
+            f"{function}: found a drive, time enters the equations of {scene!r}; expected none; `periodic_orbit` finds "
             "motions that repeat themselves with the drive"
         )
     if equations.sticks:
         raise ValueError(
-            "equilibrium: found set-valued friction, under which whole ranges of states rest; expected a smoothed law"
+            f"{function}: found set-valued friction, under which whole ranges of states rest; expected a smoothed law"
         )
     expect_continuous(equations)
     return equations
@@ -509,9 +509,9 @@ def _solve_linear(matrix: sparse.csc_array, right: np.ndarray) -> np.ndarray:
     return np.asarray(columns * both[len(right) :])
 
 
-def _eigenvalues(network: Linearised, state: np.ndarray, count: int | None) -> np.ndarray:
-    """Return eigenvalues of M^-1 J, in any order: all, or the `count` nearest to zero."""
-    jacobian, mass, size = network.jacobian(state), network.mass(state), len(state)
+def eigenvalues(jacobian: sparse.csc_array, mass: sparse.csc_array | None, count: int | None = None) -> np.ndarray:
+    """Return eigenvalues of M^-1 J, in any order: all up to DENSE states, or the `count` nearest to zero."""
+    size = jacobian.shape[0]
     if count is None and size > DENSE:
         count = FEW
     if count is None or count >= size - 1:  # Arnoldi's method gives size - 2 at most

@@ -1,4 +1,4 @@
-"""Kinds of bifurcations of periodic orbits."""
+"""Kinds of bifurcations of equilibria and periodic orbits."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from enum import StrEnum
 
 
 class BifurcationKind(StrEnum):
-    """Kind of a bifurcation of periodic orbits, named by the multiplier that passes the unit circle, or by the friction."""
+    """Kind of a bifurcation, named by the eigenvalue or multiplier that passes, or by the friction."""
 
+    FOLD = "fold"  # at 0 or 1; the branch turns back in its parameter
+    BRANCH_POINT = "branch point"  # at 0 or 1; transcritical or pitchfork
+    HOPF = "Hopf"  # a complex pair of eigenvalues of an equilibrium
     PERIOD_DOUBLING = "period doubling"  # at -1
-    FOLD = "fold"  # at 1; the branch turns back in its parameter
-    BRANCH_POINT = "branch point"  # at 1; transcritical or pitchfork
-    NEIMARK_SACKER = "Neimark-Sacker"  # a complex pair
+    NEIMARK_SACKER = "Neimark-Sacker"  # a complex pair of multipliers
     GRAZING = "grazing"  # a phase of stick or slip begins in the middle of another one
     STICK_LOSS = "stick loss"  # a body that landed in stick turns at once

@@ -7,7 +7,7 @@ add to it; Jacobian and mass matrix are sums of small dense blocks, assembled in
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeAlias
 
@@ -39,7 +39,7 @@ class TermTemplate(NamedTuple):
     indices: tuple[np.ndarray, ...]
     parameters: list[Parameter]
 
-    def along(self, dimension: int) -> TermTemplate:
+    def along(self) -> TermTemplate:
         """Return the template of r_x u, where the direction u follows the state of the network in one vector."""
         directions = [sp.Symbol(f"along {s.name}", real=True) for s in self.states]
         pairs = [*zip(self.states, directions, strict=True)]
@@ -47,7 +47,7 @@ class TermTemplate(NamedTuple):
         if self.others[: len(directions)] == directions:  # a second derivative along the same direction
             return self._replace(rates=rates)
         # The directions are further states by which nothing is differentiated.
-        return self._replace(others=[*directions, *self.others], rates=rates, indices=self.indices)
+        return self._replace(others=[*directions, *self.others], rates=rates)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,10 +63,10 @@ class TemplateFunction:
     parameters: tuple[float | np.ndarray, ...] = ()  # one value for all, or (count,)
 
     @classmethod
-    def of(cls, template: TermTemplate, dimension: int, masses: bool = False) -> TemplateFunction:
-        """Compile a template: rates with their Jacobian, or masses alone."""
-        size, symbols, indices = len(template.rates), [*template.states, *template.others], template.indices
-        blocks = template.masses if masses else _slopes(template)
+    def of(cls, template: TermTemplate, dimension: int, blocks: Sequence[Block]) -> TemplateFunction:
+        """Compile the rates of a template, and the blocks of a matrix, one for each array of indices."""
+        symbols, indices = [*template.states, *template.others], template.indices
+        size = indices[0].shape[1]
         places = [
             (k, i, j) for k, block in enumerate(blocks) for i in range(size) for j in range(size) if block[i][j] != 0
         ]
@@ -75,9 +75,10 @@ class TemplateFunction:
         directions = len(template.others) - len(template.parameters)
         inputs = (*indices, *(each + dimension for each in indices)) if directions else indices
         shape, states = (len(places), len(indices[0])), frozenset(template.states)
+        sized = template.rates if blocks else ()  # higher derivatives have no equations to solve
         return cls(
             sp.lambdify(symbols, template.rates, ["scipy", "numpy"]),
-            sp.lambdify(symbols, [term_size(e, states) for e in template.rates], ["scipy", "numpy"], cse=True),
+            sp.lambdify(symbols, [term_size(e, states) for e in sized], ["scipy", "numpy"], cse=True),
             sp.lambdify(symbols, [blocks[k][i][j] for k, i, j in places], ["scipy", "numpy"]),
             inputs,
             (np.reshape(rows, shape), np.reshape(columns, shape)),
@@ -118,20 +119,28 @@ class Linearised:
         """Compile equations with the values of their parameters."""
         templates = (*_node_templates(equations), *_link_templates(equations))
         heavy = [each for each in templates if each.masses] if equations.inertial else []
-        masses = tuple(TemplateFunction.of(each, equations.dimension, masses=True) for each in heavy)
-        return cls(equations.dimension, (), masses, templates, equations.constant_mass)._compiled().at(values)
-
-    def _compiled(self) -> Linearised:
-        return replace(self, rate_templates=tuple(TemplateFunction.of(each, self.dimension) for each in self.templates))
+        masses = (TemplateFunction.of(each._replace(rates=()), equations.dimension, each.masses) for each in heavy)
+        rates = (TemplateFunction.of(each, equations.dimension, _slopes(each)) for each in templates)
+        made = cls(equations.dimension, tuple(rates), tuple(masses), templates, equations.constant_mass)
+        return made.at(values)
 
     def at(self, values: Mapping[str, float]) -> Linearised:
         """Return the equations with other values of their parameters; nothing is compiled."""
         rates, masses = (tuple(each.at(values) for each in part) for part in (self.rate_templates, self.mass_templates))
         return replace(self, rate_templates=rates, mass_templates=masses)
 
-    def along(self) -> Linearised:
-        """Return r_x u as a function of the vector (x, u), its Jacobian that by x; again, r_xx u u. `at` gives numbers."""
-        return replace(self, templates=tuple(each.along(self.dimension) for each in self.templates))._compiled()
+    def along(self, order: int) -> Linearised:
+        """Return the derivative of r along u of an order, r_x u or r_xx u u, as a function of the vector (x, u).
+
+        The first one has a Jacobian by x, r_xx u. Parameters have no values before `at`.
+        """
+        templates = self.templates
+        for _ in range(order):
+            templates = tuple(each.along() for each in templates)
+        blocks = [_slopes(each) if order == 1 else [] for each in templates]
+        pairs = zip(templates, blocks, strict=True)
+        functions = (TemplateFunction.of(each, self.dimension, slopes) for each, slopes in pairs)
+        return replace(self, rate_templates=tuple(functions))
 
     def rates(self, state: np.ndarray) -> np.ndarray:
         """Return r (dimension,) at a state."""

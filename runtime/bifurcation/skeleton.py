@@ -34,9 +34,11 @@ from ..stability.orbits import OrbitProblem, driven_states, within
 from ..support.arrays import row
 from ..support.execution import Execution
 from ..support.progress import Hook
-from .branches import Branch, checked_values, others, traced, warn_of_lost
+from .branches import warn_of_lost
 from .kinds import BifurcationKind
+from .orbit_tracer import checked_values, others, traced
 from .periodic import NEWTON, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit, relative, whole_turns
+from .results import Branch
 
 Range = tuple[float, float]
 """Ends of an interval."""
@@ -396,6 +398,8 @@ def _both_ways(scene: Scene, name: str, grid: list[float], k: int, orbit: Period
         np.concatenate([down.values[:0:-1], up.values]),
         (*down.orbits[:0:-1], *up.orbits),
         (*down.bifurcations[::-1], *up.bifurcations),
+        np.concatenate([down.growing[:0:-1], up.growing]),
+        np.concatenate([down.lengths[:0:-1], up.lengths]),
         (*down.phases[:0:-1], *up.phases),
         (*down.lost, *up.lost),
     )
@@ -416,7 +420,7 @@ def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrb
             # distance.
             values = [fold + 4.0**-j * (end - fold) for j in range(NEARER, -1, -1)]
             try:
-                start = turn.orbit.state - 2.0**-NEARER * (last.state - turn.orbit.state)
+                start = turn.solution.state - 2.0**-NEARER * (last.state - turn.solution.state)
                 first = periodic_orbit(scene, last.periods, start, parameters={branch.name: values[0]})
                 sheet = traced(scene, branch.name, values, first, abs(end - fold))
             except ArithmeticError:

@@ -12,7 +12,7 @@ from ..console.scene_arguments import add_changed_scene, add_output, changed_sce
 if TYPE_CHECKING:
     from synchain.models.scenes.scene import Scene
 
-    from ..bifurcation.branches import Branch
+    from ..bifurcation.results import Branch
 
 SUMMARY = "find a periodic orbit of an oscillator, or follow it along a parameter to its bifurcations"
 EXAMPLES = (
@@ -51,6 +51,6 @@ def execute(arguments: Namespace) -> int:
     def branch(scene: Scene, periods: int = 1) -> Branch:
         """Follow the orbit that is found at the first value."""
         first = periodic_orbit(scene, periods, parameters={name: values[0]})
-        return follow(scene, name, values, first)
+        return follow(first, name, values=values)
 
     return compute(branch, scene, arguments, ("periods",))

@@ -90,6 +90,7 @@ from synchain.models import watts_strogatz as watts_strogatz
 from synchain.models import weighted as weighted
 from synchain.models import wheel as wheel
 from synchain.runtime import Basin as Basin
+from synchain.runtime import Bifurcation as Bifurcation
 from synchain.runtime import Branch as Branch
 from synchain.runtime import ClusterExponents as ClusterExponents
 from synchain.runtime import Criterion as Criterion

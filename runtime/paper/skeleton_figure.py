@@ -20,9 +20,9 @@ from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.models.sweeps.axis import Axis
 
-from ..bifurcation.branches import Branch
 from ..bifurcation.kinds import BifurcationKind
 from ..bifurcation.periodic import PeriodicOrbit
+from ..bifurcation.results import Branch
 from ..bifurcation.skeleton import skeleton
 from ..plots.branch_marks import MARK, MARKERS, STABLE, UNSTABLE
 from ..plots.csv_table import as_csv

@@ -1,4 +1,4 @@
-"""Lines and marks of branches of periodic orbits and of their bifurcations."""
+"""Lines and marks of branches and of their bifurcations."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ MARKERS = {
     BifurcationKind.PERIOD_DOUBLING: "o",
     BifurcationKind.FOLD: "s",
     BifurcationKind.BRANCH_POINT: "D",
+    BifurcationKind.HOPF: "*",
     BifurcationKind.NEIMARK_SACKER: "p",
     BifurcationKind.GRAZING: "^",
     BifurcationKind.STICK_LOSS: "v",

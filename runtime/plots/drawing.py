@@ -15,9 +15,9 @@ from synchain.models.graphs.topology import Topology
 from synchain.models.inputs.display import HasPlot
 from synchain.models.spectra.spectrum import Spectrum
 
-from ..bifurcation.branches import Branch
 from ..bifurcation.equilibrium import Equilibrium
 from ..bifurcation.periodic import PeriodicOrbit
+from ..bifurcation.results import Branch
 from ..bifurcation.skeleton import Skeleton
 from ..results.result import Result
 from ..stability.cluster_exponents import BlockVerdict, ClusterExponents
@@ -224,44 +224,61 @@ def _(value: Skeleton, axes: Axes, **style: Any) -> Axes:
 
 
 def _branches(branches: tuple[Branch, ...], axes: Axes, style: dict[str, Any]) -> Axes:
-    """Draw the first component at the start of a period: solid where stable, dashed where unstable."""
-    # one colour for each number of drive periods; `legend` holds one entry for each style that is drawn
+    """Draw the first state at rest or at the start of a period: solid where stable, dashed where unstable."""
+    # one colour for equilibria and each number of drive periods; `legend` holds one entry for each style that is drawn
     colours = (PURPLE, BLUE, ORANGE, GREEN)
-    counts = sorted({branch.orbits[0].periods for branch in branches})
+    kinds = sorted({_kind(branch) for branch in branches})
     legend: dict[str, dict[str, Any]] = {
-        f"{n} drive period{'s' * (n > 1)}": {"color": colours[k % len(colours)]} for k, n in enumerate(counts)
+        text: {"color": colours[k % len(colours)]} for k, (_, text) in enumerate(kinds)
     }
     for branch in branches:
-        colour = colours[counts.index(branch.orbits[0].periods) % len(colours)]
+        colour = colours[kinds.index(_kind(branch)) % len(colours)]
         for stable, values, states in stretches(branch):
             axes.plot(values, states[:, 0], **line_style(style, color=colour, **(STABLE if stable else UNSTABLE)))
             legend["stable" if stable else "unstable"] = {"color": BLACK, **(STABLE if stable else UNSTABLE)}
         for turn in branch.bifurcations:
-            axes.plot([turn.value], [turn.orbit.state[0]], color=colour, marker=MARKERS[turn.kind], **MARK)
+            axes.plot([turn.value], [turn.solution.state[0]], color=colour, marker=MARKERS[turn.kind], **MARK)
             legend[str(turn.kind)] = {"color": BLACK, "marker": MARKERS[turn.kind], **MARK}
     if branches:
-        name = symbol(branches[0].orbits[0].components[0])
-        axes.set(xlabel=symbol(branches[0].name), ylabel=f"{name} at the beginning of a period")
+        first = branches[0].solutions[0]
+        name = first.scene.equations.state[0] if isinstance(first, Equilibrium) else first.components[0]
+        when = "" if isinstance(first, Equilibrium) else " at the beginning of a period"
+        axes.set(xlabel=symbol(branches[0].name), ylabel=f"{symbol(name)}{when}")
         handles = [Line2D([], [], label=label, **look) for label, look in legend.items()]
         axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize="x-small")
     return axes
 
 
+def _kind(branch: Branch) -> tuple[int, str]:
+    """Return the number of drive periods, 0 for equilibria, with the text of the legend."""
+    first = branch.solutions[0]
+    if isinstance(first, Equilibrium):
+        return 0, "equilibria"
+    return first.periods, f"{first.periods} drive period{'s' * (first.periods > 1)}"
+
+
 def stretches(branch: Branch) -> list[tuple[bool, np.ndarray, np.ndarray]]:
-    """Cut a branch at its bifurcations into stretches of one stability."""
-    orbits = [(float(value), orbit, False) for value, orbit in zip(branch.values, branch.orbits, strict=True)]
-    turns = [(float(turn.value), turn.orbit, True) for turn in branch.bifurcations]
+    """Cut a branch at its bifurcations into stretches of one stability: stable or not, values, states."""
+    stable = branch.stable
+    points = [
+        (at, value, each.state, bool(good))
+        for at, value, each, good in zip(branch.lengths, branch.values, branch.solutions, stable, strict=True)
+    ]
+    # The place of a bifurcation on the branch is its arclength, or the parameter where that is the length.
+    turns = [
+        (t.value if np.isnan(t.length) else t.length, t.value, t.solution.state, None) for t in branch.bifurcations
+    ]
     lines: list[tuple[bool, list[tuple[float, np.ndarray]]]] = []
     ends: list[tuple[float, np.ndarray]] = []
-    for value, orbit, at_bifurcation in sorted(orbits + turns, key=lambda each: each[0]):
-        point = (value, orbit.state)
-        if at_bifurcation:
+    for _, value, state, good in sorted([*points, *turns], key=lambda each: each[0]):
+        point = (value, state)
+        if good is None:
             # the bifurcation ends this stretch and begins the next one
             if lines and not ends:
                 lines[-1][1].append(point)
             ends = [point]
-        elif not lines or ends or lines[-1][0] != orbit.stable:
-            lines.append((orbit.stable, [*ends, point]))
+        elif not lines or ends or lines[-1][0] != good:
+            lines.append((good, [*ends, point]))
             ends = []
         else:
             lines[-1][1].append(point)

@@ -193,8 +193,8 @@ def _orbit_of_drive(units: Units, change: Change) -> tuple[sc.Scene, sc.Periodic
 
 
 def of_follow(units: Units, change: Change, path: Path) -> Answer:
-    scene, first = _orbit_of_drive(units, change)
-    branch = sc.follow(scene, "w", [1.2, 1.25], first, **QUIET)
+    _, first = _orbit_of_drive(units, change)
+    branch = sc.follow(first, "w", values=[1.2, 1.25])
     return {"states": units.take(np.array([orbit.state for orbit in branch.orbits]).T)}
 
 

@@ -316,7 +316,7 @@ def test_branches_follow_any_drive(files: Path) -> None:
     network = scene(files)
     orbit = periodic_orbit(network, F=0.05)
     weak = network.replace(F=0.05)
-    branch = follow(weak, "Omega", [1.2, 1.25], orbit)
+    branch = follow(orbit, "Omega", values=[1.2, 1.25])
     assert [abs(np.prod(o.multipliers)) for o in branch.orbits] == pytest.approx(
         [np.exp(-0.15 * 2 * np.pi / value) for value in (1.2, 1.25)], rel=1e-9
     )  # Liouville

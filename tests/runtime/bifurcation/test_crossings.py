@@ -31,7 +31,7 @@ NODE = Field(
 
 def followed(name: str, values: list[float], start: tuple[float, float] = (0.0, 0.0), **more: float) -> Branch:
     scene = Scene(NODE, topology=topology("chain", 1), parameters=more)
-    return follow(scene, name, values, periodic_orbit(scene, 1, start, parameters={name: values[0]}))
+    return follow(periodic_orbit(scene, 1, start, parameters={name: values[0]}), name, values=values)
 
 
 def found(branch: Branch) -> list[tuple[str, float]]:
@@ -108,13 +108,13 @@ def test_a_branch_born_in_a_pitchfork_ends_at_a_branch_point() -> None:
 def test_symmetric_and_other_orbits_of_duffing_meet_at_a_pitchfork() -> None:
     """The symmetric orbit goes through it, the other ends there, for coarse values too."""
     scene = Scene("duffing")
-    through = follow(scene, "u", [2.4, 2.6], periodic_orbit(scene, 1, u=2.4))
+    through = follow(periodic_orbit(scene, 1, u=2.4), "u", values=[2.4, 2.6])
     (kind, at), *none = found(through)
     assert (kind, none) == ("branch point", [])
     other = periodic_orbit(scene, 1, u=2.7)
     assert abs(other.multipliers[0].imag) > 0.1  # that of the symmetric one is real
     for values in ([2.7, 2.6, 2.5, 2.3], np.linspace(2.7, 2.4, 16)):
-        ending = follow(scene, "u", values, other)
+        ending = follow(other, "u", values=values)
         assert found(ending) == [("branch point", pytest.approx(at, abs=1e-10))]
         assert ending.values[-1] > at
 
@@ -159,7 +159,7 @@ def test_doublings_of_a_parametric_oscillator_are_found_in_any_form_of_its_drive
         parameters={"w": 1.1, "d": 0.1, "a": 1, "f0": 0.05},
     )
     one = Scene(node, None, None, initial={"x": 0, "v": 0}, transient=100)
-    branch = follow(one, "w", [1.1, 1.12, 1.15, 1.23, 1.3, 1.33], periodic_orbit(one))
+    branch = follow(periodic_orbit(one), "w", values=[1.1, 1.12, 1.15, 1.23, 1.3, 1.33])
     assert [turn.kind for turn in branch.bifurcations] == ["period doubling"] * 2
     np.testing.assert_allclose([turn.value for turn in branch.bifurcations], [1.133433, 1.310721], atol=1e-6)
 
@@ -193,7 +193,7 @@ def seen(branch: Branch) -> list[tuple[str, float]]:
 def test_bifurcations_do_not_depend_on_the_number_of_values(count: int) -> None:
     """A step over the whole range led from the asymmetric orbit to the symmetric one; SciPy gives the values."""
     first = periodic_orbit(wells(), 1, [-0.504565084, 0.09546030488], F=LOW)
-    branch = follow(wells(), "F", np.linspace(LOW, HIGH, count), first)
+    branch = follow(first, "F", values=np.linspace(LOW, HIGH, count))
     assert seen(branch) == IN_WELL
     drives = np.linspace(LOW, HIGH, count)
     assert branch.values.tolist() == drives[drives < 1.2862282].tolist()
@@ -217,10 +217,10 @@ def test_a_pitchfork_and_a_fold_are_found_with_any_number_of_values(count: int) 
     node = Field({"x": "f + (a + cos(t))*x - x**3"}, parameters={"a": 0.3, "f": 0.0})
     scene = Scene(node, None, None, initial={"x": 0.5}, transient=50)
     first = periodic_orbit(scene)
-    assert seen(follow(scene, "a", np.linspace(0.3, -0.4, count), first)) == [
+    assert seen(follow(first, "a", values=np.linspace(0.3, -0.4, count))) == [
         ("branch point", pytest.approx(0.0, abs=1e-8))
     ]
-    folded = follow(scene, "f", np.linspace(0.0, -1.4, count), first)
+    folded = follow(first, "f", values=np.linspace(0.0, -1.4, count))
     assert seen(folded) == [("fold", pytest.approx(-0.0334640228, abs=1e-8))]
 
 
@@ -232,7 +232,7 @@ def test_two_doublings_in_one_step_are_found(count: int) -> None:
         parameters={"w": 1.1, "d": 0.1, "a": 1, "f0": 0.05},
     )
     scene = Scene(node, None, None, initial={"x": 0, "v": 0}, transient=100)
-    branch = follow(scene, "w", np.linspace(1.1, 1.33, count), periodic_orbit(scene))
+    branch = follow(periodic_orbit(scene), "w", values=np.linspace(1.1, 1.33, count))
     assert seen(branch) == [("period doubling", pytest.approx(at, abs=1e-6)) for at in (1.133433, 1.310721)]
 
 
@@ -241,6 +241,6 @@ def test_a_bifurcation_with_a_large_residual_is_none() -> None:
     node = Field({"x": "(tanh(r*a) + cos(t))*x/2"}, parameters={"a": -1.0, "r": 1e9})
     scene = Scene(node, None, None, initial={"x": 0.0})
     with pytest.warns(RuntimeWarning, match="found no orbit and no bifurcation beyond a = "):
-        branch = follow(scene, "a", [-1.0, 1.5], periodic_orbit(scene, 1, [0.0]))
+        branch = follow(periodic_orbit(scene, 1, [0.0]), "a", values=[-1.0, 1.5])
     assert branch.bifurcations == ()
     assert branch.lost == (pytest.approx(0.0, abs=1e-5),)

@@ -105,7 +105,7 @@ def test_an_orbit_of_an_angle_passes_through_its_states_some_turns_away(turns: i
 @pytest.mark.long
 def test_a_period_doubling_is_found_where_the_double_period_is_born() -> None:
     first = periodic_orbit(scene(), 2, omega=1.2)
-    branch = follow(scene(), "omega", np.linspace(1.2, 1.24, 5), first)
+    branch = follow(first, "omega", values=np.linspace(1.2, 1.24, 5))
     (change,) = branch.bifurcations
     at, kind = change.value, change.kind
     assert kind == "period doubling"
@@ -136,7 +136,7 @@ def test_stops_begin_where_den_hartogs_motion_ends() -> None:
     first = periodic_orbit(coulomb(1.2 * last))
     assert first.phases is not None
     assert first.phases.slip_states == (-1, 1)
-    branch = follow(coulomb(1.2 * last), "u", np.linspace(1.2 * last, 0.9 * last, 3), first)
+    branch = follow(first, "u", values=np.linspace(1.2 * last, 0.9 * last, 3))
     (change,) = branch.bifurcations
     at, kind = change.value, change.kind
     assert kind == "stick loss"
@@ -152,16 +152,21 @@ def test_a_branch_goes_through_a_graze_to_its_fold() -> None:
     """omega = 0.7: as the drive grows the load in stick of period one comes up to the limit of static friction, at the rate
     at which its gap has fallen; beyond, the orbit lets go twice, and ends where it meets another one."""
     network = scene(transient=60.0, parameters={"omega": 0.7, "u": 0.15})
-    branch = follow(network, "u", [0.15, 0.25, 0.35, 0.45, 0.5, 0.55], periodic_orbit(network))
+    branch = follow(periodic_orbit(network), "u", values=[0.15, 0.25, 0.35, 0.45, 0.5, 0.55])
     assert [each.kind for each in branch.bifurcations] == ["period doubling", "grazing", "period doubling", "fold"]
     assert len(branch.orbits) == 5
     gaps = [phases.gap for phases in branch.phases[-2:]]
     at = branch.bifurcations[1].value
     assert at == pytest.approx(0.5 + 0.05 * gaps[1] / (gaps[0] - gaps[1]), abs=2e-4)
     assert max(each.residual for each in branch.bifurcations) < 3e-12
-    assert [len(each.orbit.phases.slip_states) for each in branch.bifurcations if each.orbit.phases] == [2, 2, 4, 4]
-    edge, turn = branch.bifurcations[-1].value, branch.bifurcations[-1].orbit.state
-    here = follow(network, "u", [0.5, 0.53, edge - 1e-4], branch.orbits[-1]).orbits[-1]
+    assert [len(each.solution.phases.slip_states) for each in branch.bifurcations if each.solution.phases] == [
+        2,
+        2,
+        4,
+        4,
+    ]
+    edge, turn = branch.bifurcations[-1].value, branch.bifurcations[-1].solution.state
+    here = follow(branch.orbits[-1], "u", values=[0.5, 0.53, edge - 1e-4]).orbits[-1]
     other = periodic_orbit(
         network, 1, 2.0 * turn - here.state, u=edge - 1e-4
     )  # the sheets lie on both sides of the fold
@@ -212,16 +217,24 @@ def test_what_is_refused() -> None:
         (lambda s, o: periodic_orbit(s, 2, [np.nan, 0]), ValueError, "expected a number for each of x, v"),
         (lambda s, o: stability_end(o, "a", 1), ValueError, "low = 'a'; expected a finite strength alpha"),
         (lambda s, o: stability_end(o, 0.1, np.inf), ValueError, "high = inf; expected a finite strength alpha"),
-        (lambda s, o: follow(s, "omga", [1.0], o), ValueError, "unknown parameter 'omga'; known: theta_b"),
-        (lambda s, o: follow(s, "omega", [], o), ValueError, r"values: found \[\]; expected at least one number"),
-        (lambda s, o: follow(s, "omega", [1.15, 1.16, 1.1], o), ValueError, "rising or falling all the way"),
+        (lambda s, o: follow(o, "omga", values=[1.0]), ValueError, "unknown parameter 'omga'; known: theta_b"),
+        (lambda s, o: follow(o, "omega", values=[]), ValueError, r"values: found \[\]; expected at least one number"),
+        (lambda s, o: follow(o, "omega", values=[1.15, 1.16, 1.1]), ValueError, "rising or falling all the way"),
         (
-            lambda s, o: follow(s, "omega", ["a"], o),
+            lambda s, o: follow(o, "omega", values=["a"]),
             ValueError,
             r"values: found \['a'\]; expected finite numbers for omega",
         ),
-        (lambda s, o: follow(s, "omega", 1.15, o), ValueError, "values: found 1.15; expected finite numbers for omega"),
-        (lambda s, o: follow(s, "omega", [1.15], None), TypeError, "first: found None; expected a PeriodicOrbit"),
+        (
+            lambda s, o: follow(o, "omega", values=1.15),
+            ValueError,
+            "values: found 1.15; expected finite numbers for omega",
+        ),
+        (
+            lambda s, o: follow(None, "omega", values=[1.15]),
+            TypeError,
+            "first: found None; expected an Equilibrium, PeriodicOrbit",
+        ),
         (lambda s, o: skeleton(s, "omga", [1.15]), ValueError, "unknown parameter 'omga'"),
         (
             lambda s, o: skeleton(s, "omega", [1.15], looks=0),

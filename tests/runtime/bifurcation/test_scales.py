@@ -33,7 +33,7 @@ def in_units(state: np.ndarray, scene: sc.Scene) -> np.ndarray:
 @pytest.fixture(scope="module")
 def plain() -> tuple[sc.PeriodicOrbit, sc.Branch]:
     orbit = sc.periodic_orbit(duffing())
-    return orbit, sc.follow(duffing(), "F", [0.08, 0.1, 0.12], orbit)
+    return orbit, sc.follow(orbit, "F", values=[0.08, 0.1, 0.12])
 
 
 @pytest.mark.parametrize("units", UNITS)
@@ -45,7 +45,7 @@ def test_orbits_and_branches_follow_the_units_of_state_and_time(
     found = sc.periodic_orbit(scene)
     np.testing.assert_allclose(in_units(found.state, scene), orbit.state, atol=1e-9)
     np.testing.assert_allclose(found.multipliers, orbit.multipliers, rtol=1e-8)
-    along = sc.follow(scene, "F", [0.08, 0.1, 0.12], found)
+    along = sc.follow(found, "F", values=[0.08, 0.1, 0.12])
     assert [turn.kind for turn in along.bifurcations] == ["fold"] == [turn.kind for turn in branch.bifurcations]
     assert along.bifurcations[0].value == pytest.approx(branch.bifurcations[0].value, rel=1e-9)
     assert len(along.orbits) == len(branch.orbits) == 2
@@ -119,7 +119,14 @@ def test_lines_of_a_branch_end_at_its_bifurcations_and_are_of_one_stability(
     orbit = branch.orbits[0]
     lost = sc.PeriodicOrbit(orbit.scene, 1, orbit.state, np.array([-1.5, 0.1]), 0.0, 1)
     turn = branch.bifurcations[0]
-    crossed = sc.Branch("F", np.array([0.08, 0.1, 0.12, 0.14]), (orbit, orbit, lost, lost), (turn,))
+    crossed = sc.Branch(
+        "F",
+        np.array([0.08, 0.1, 0.12, 0.14]),
+        (orbit, orbit, lost, lost),
+        (turn,),
+        np.array([0, 0, 1, 1]),
+        np.array([0.08, 0.1, 0.12, 0.14]),
+    )
     first, second = stretches(crossed)
     np.testing.assert_array_equal(first[1], [0.08, 0.1, turn.value])
     np.testing.assert_array_equal(second[1], [turn.value, 0.12, 0.14])
@@ -150,7 +157,6 @@ def test_every_field_of_a_scene_is_obeyed_refused_or_of_no_matter(plain: tuple[s
     orbit, _ = plain
     calls = {
         "periodic_orbit": lambda scene: sc.periodic_orbit(scene).state,
-        "follow": lambda scene: sc.follow(scene, "F", [0.08], orbit).orbits[0].state,
         "skeleton": lambda scene: sc.skeleton(scene, "F", [0.08], (1,), 1, show_progress=False),
     }
     for field, value in FIELDS["same"].items():
@@ -159,7 +165,7 @@ def test_every_field_of_a_scene_is_obeyed_refused_or_of_no_matter(plain: tuple[s
         np.testing.assert_allclose(answer, orbit.state, rtol=1e-12)
     for field, value in FIELDS["refused"].items():
         for name, call in calls.items():
-            if (field, name) not in {("axes", "follow"), ("axes", "skeleton")}:  # the parameter that they sweep
+            if (field, name) != ("axes", "skeleton"):  # the parameter that it sweeps
                 with pytest.raises(ValueError, match=f"{name}: found {field}"):
                     call(duffing().replace(**{field: value}))
     left = sc.periodic_orbit(duffing().replace(initial=FIELDS["other"]["initial"]))

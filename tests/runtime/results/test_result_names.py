@@ -10,9 +10,9 @@ from synchain.codegen.driver.columns import SpanColumn
 from synchain.models import Field, Rates, Scene, chain, normal
 from synchain.models.inputs.names import ATTRIBUTES, TAKEN
 from synchain.runtime import PeriodicOrbit, Result, Skeleton, follow, plane, run, skeleton
-from synchain.runtime.bifurcation import branches
-from synchain.runtime.bifurcation.bifurcations import Bifurcation
+from synchain.runtime.bifurcation import results
 from synchain.runtime.bifurcation.kinds import BifurcationKind
+from synchain.runtime.bifurcation.results import Bifurcation
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.results.certificate import Certificate
 from synchain.runtime.results.result import gather
@@ -51,9 +51,11 @@ def test_no_plane_and_no_branch_has_other_names() -> None:
     )  # fmt: skip
     assert (own(result.data) | {*result.as_dict()}) - TAKEN - {"b", "c"} <= msf.NAMES
     orbit = PeriodicOrbit(Scene("duffing"), 1, np.zeros(2), np.zeros(2), 0.0, 1)
-    branch = branches.Branch("b", np.zeros(1), (orbit,), (Bifurcation(0.0, BifurcationKind.FOLD, 0.0, orbit),))
-    assert own(branch.data) - TAKEN - {"b"} <= branches.NAMES
-    assert own(Skeleton((branch,)).data) - TAKEN - {"b"} <= branches.NAMES
+    branch = results.Branch("b", np.zeros(1), (orbit,), (Bifurcation(0.0, BifurcationKind.FOLD, 0.0, orbit),),
+        np.zeros(1, int), np.zeros(1),
+    )  # fmt: skip
+    assert own(branch.data) - TAKEN - {"b"} <= results.NAMES
+    assert own(Skeleton((branch,)).data) - TAKEN - {"b"} <= results.NAMES
 
 
 def test_they_are_refused_before_anything_runs() -> None:
@@ -65,6 +67,6 @@ def test_they_are_refused_before_anything_runs() -> None:
         plane(scene, [0.0, 1.0], parameters={"mode": [1, 5]})
     orbit = PeriodicOrbit(scene, 1, np.zeros(1), np.zeros(1), 0.0, 1)
     with pytest.raises(ValueError, match="branch: found the name 'stable', which results have for something else"):
-        follow(scene, "stable", [1.0, 2.0], orbit)
+        follow(orbit, "stable", values=[1.0, 2.0])
     with pytest.raises(ValueError, match="branch: found the name 'node', which results have for something else"):
         skeleton(scene, "node", [1.0, 2.0])

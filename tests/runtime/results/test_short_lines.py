@@ -6,7 +6,8 @@ import numpy as np
 
 from synchain.models import Scene, chain, ring
 from synchain.runtime import PeriodicOrbit, kernel
-from synchain.runtime.bifurcation.bifurcations import Bifurcation, BifurcationKind
+from synchain.runtime.bifurcation.kinds import BifurcationKind
+from synchain.runtime.bifurcation.results import Bifurcation
 from synchain.runtime.prediction.synchronisability import verdict, windows
 
 
@@ -31,4 +32,4 @@ def test_kernels_and_bifurcations_hide_their_insides() -> None:
     assert repr(kernel(scene)).startswith("Kernel(2 nodes, dop853, driver of sweeps, ")
     orbit = PeriodicOrbit(scene, 1, np.zeros(2), np.zeros(2), 0.0, 1)
     found = Bifurcation(1.2256, BifurcationKind.PERIOD_DOUBLING, 1e-9, orbit)
-    assert repr(found) == "Bifurcation(period doubling at 1.2256, residual 1.0e-09)"
+    assert found.text == "period doubling at 1.2256"

@@ -1,0 +1,229 @@
+"""Follow the solutions of any problem along their arclength.
+
+1. Step.  From a solution z with the tangent t, Newton's method starts at z + h t and stays on the hyperplane normal to t
+   (Keller).  Lengths are those of the problem's metric.
+2. Linear equations.  R has one unknown more than equations.  Its Jacobian without the column in which t is largest is
+   square, and regular at folds; one LU factorisation gives the tangent and the step on any hyperplane (Rheinboldt).
+   No row of the hyperplane enters the factors, which stay sparse.
+3. Rounding.  A residual at the level of rounding is a solution: at branch points the matrix is singular.
+4. Step size.  Few corrections lengthen the step, many shorten it.  A step that does not converge, or on which the
+   tangent turns by more than ANGLE, is halved.
+
+Sources: Keller, in Rabinowitz (ed.), Applications of Bifurcation Theory (Academic Press, 1977), pages 359-384;
+Rheinboldt & Burkardt, ACM Trans. Math. Softw. 9, 215 (1983); Allgower & Georg, Introduction to Numerical
+Continuation Methods (SIAM, 2003), chapter 6.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.linalg import lapack
+from scipy.sparse.linalg import splu
+
+from .problems import Critical, Matrix, Problem
+
+MOST_CORRECTIONS = 12
+"""Most corrections of a step (a choice)."""
+
+CLOSE = 1e-11
+"""A solution is accepted after a correction of this length; the next would be its square (a choice)."""
+
+FEW, MANY, LONGER, SHORTER = 3, 5, 1.4, 0.7
+"""Steps of at most FEW corrections are LONGER next time, those of more than MANY are SHORTER (choices)."""
+
+ANGLE = math.cos(math.radians(25.0))
+"""Cosine of the largest angle between the tangents at both ends of a step (a choice)."""
+
+SHORTEST = 1e-9
+"""Shortest step; the branch is lost if it must be shorter (a choice)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A solution with its tangent."""
+
+    z: np.ndarray  # (size + 1,)
+    tangent: np.ndarray  # (size + 1,): of length 1 in the metric of its problem
+    corrections: int
+    critical: Critical | None = None
+    length: float = 0.0  # arclength from the first solution
+
+    @property
+    def value(self) -> float:
+        """The parameter."""
+        return float(self.z[-1])
+
+
+class Factors:
+    """The LU factors of a matrix (size, size + 1) without one column; a singular matrix raises ArithmeticError."""
+
+    def __init__(self, matrix: Matrix, column: int) -> None:
+        self.column = column
+        kept = np.delete(np.arange(matrix.shape[1]), column)
+        try:
+            if isinstance(matrix, np.ndarray):
+                factors, pivots, info = lapack.dgetrf(matrix[:, kept])
+                singular = info != 0
+                self.right = matrix[:, column]
+                self._solve: Callable[[np.ndarray], np.ndarray] = lambda right: lapack.dgetrs(factors, pivots, right)[0]
+            else:
+                solver, singular = splu(sparse.csc_array(matrix[:, kept])), False
+                self.right = matrix[:, [column]].toarray().ravel()
+                self._solve = solver.solve
+        except RuntimeError:  # splu met a pivot of zero
+            singular = True
+        if singular:
+            raise ArithmeticError("the matrix of Newton's method is singular")
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Return the solution (size + 1,) whose unknown of the left-out column is 0."""
+        return np.insert(self._solve(right), self.column, 0.0)
+
+    def null(self) -> np.ndarray:
+        """Return the null vector (size + 1,) whose unknown of the left-out column is 1."""
+        return np.insert(-self._solve(self.right), self.column, 1.0)
+
+
+def correct(problem: Problem, guess: np.ndarray, tangent: np.ndarray) -> Point | None:
+    """Solve a problem on the hyperplane through `guess` normal to `tangent`; None if Newton's method fails.
+
+    A tangent with a single entry keeps that unknown fixed.
+    """
+    weights = problem.weights
+    row, z, last = weights**2 * tangent, guess, math.inf
+    column = int(np.argmax(np.abs(weights * tangent)))
+    for count in range(MOST_CORRECTIONS):
+        try:
+            residual, matrix = problem.linearise(z)
+        except ArithmeticError:
+            return None
+        solved = last < CLOSE or bool(np.all(np.abs(residual) <= problem.noise(z)))
+        try:
+            factors = Factors(matrix, column)
+            null = factors.null()
+            if not np.isfinite(null).all() or row @ null == 0.0:
+                raise ArithmeticError("the tangent is not determined")
+        except ArithmeticError:  # at a branch point: any direction will do
+            return Point(z, tangent, count) if solved else None
+        if solved:
+            null *= math.copysign(1.0, row @ null) / float(np.linalg.norm(weights * null))
+            return Point(z, null, count)
+        step = factors.solve(-residual)
+        step -= null * (row @ (step + z - guess)) / (row @ null)
+        size = float(np.linalg.norm(weights * step))
+        if not size < 10.0 * last:
+            return None
+        z, last = z + step, size
+    return None
+
+
+def at_value(problem: Problem, guess: np.ndarray, place: int = -1) -> Point | None:
+    """Solve a problem with one unknown fixed to its value in `guess`, by default the parameter."""
+    fixed = np.zeros(len(guess))
+    fixed[place] = 1.0 / problem.weights[place]
+    return correct(problem, guess, fixed)
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How far a branch is followed."""
+
+    bounds: Sequence[tuple[float, float]]  # of each parameter of the problem
+    most: int  # most solutions
+    first_step: float  # lengths in the problem's metric
+    largest_step: float
+    values: Sequence[float] = ()  # values of the parameter at which solutions are added
+
+
+Events = Callable[[Problem, Point, Point, float], "list[tuple[float, object]] | None"]
+"""Bifurcations on a step (problem, before, after, length), each with its length from `before`; None: halve the step."""
+
+
+def walk(problem: Problem, first: Point, limits: Limits, events: Events) -> Generator[object, None, str]:
+    """Yield solutions and bifurcations along a branch from a first solution; returns how the branch ends.
+
+    A bifurcation is what `events` returns. Nothing is looked for on the first step if `first` has no critical values.
+    """
+    before, step = first, limits.first_step
+    for _ in range(limits.most):
+        found = _advance(problem, before, min(step, limits.largest_step), limits, events)
+        if found is None:
+            return f"lost at {problem.names[-1]} = {before.value:.8g}"
+        after, located, length, end = found
+        # Solutions at requested values and bifurcations in the order of their distance.
+        extra = [(h, point) for h, point in _at_values(problem, before, after, length, limits)]
+        for _, each in sorted([*located, *extra], key=lambda pair: pair[0]):
+            yield each
+        z, tangent = problem.accept(after.z, after.tangent)
+        before = Point(z, tangent, after.corrections, after.critical, after.length)
+        yield before
+        if end:
+            return end
+        few, many = after.corrections <= FEW, after.corrections > MANY
+        step = length * (LONGER if few else SHORTER if many else 1.0)
+    return f"{limits.most} solutions"
+
+
+def _advance(
+    problem: Problem, before: Point, step: float, limits: Limits, events: Events
+) -> tuple[Point, list[tuple[float, object]], float, str] | None:
+    """Take one step: the next solution, the bifurcations on the step, its length and how the branch ends there."""
+    while step >= SHORTEST:
+        after = correct(problem, before.z + step * before.tangent, before.tangent)
+        length, end = step, ""
+        weights = problem.weights
+        # A branch leaves a bifurcation in a direction of which the vector there is a part.
+        straight = after is None or (weights * after.tangent) @ (weights * before.tangent) > ANGLE
+        if after is not None and (straight or before.critical is None):
+            passed = _passed(after.z, limits.bounds)
+            if passed is not None:  # end on the bound
+                place, bound = passed
+                share = (bound - before.z[place]) / (after.z[place] - before.z[place])
+                guess = before.z + share * (after.z - before.z)
+                guess[place] = bound
+                after = at_value(problem, guess, place)
+                if after is not None:
+                    # The tangent of a solution with a fixed unknown points towards it: keep the direction of the step.
+                    ahead = (weights * after.tangent) @ (weights * before.tangent)
+                    length = float((weights * (after.z - before.z)) @ (weights * before.tangent))
+                    turned = after.tangent * math.copysign(1.0, ahead)
+                    after = Point(after.z, turned, after.corrections)
+                    end = f"{problem.names[place]} = {bound:.8g}"
+            if after is not None:
+                critical = problem.critical(after.z)
+                after = Point(after.z, after.tangent, after.corrections, critical, before.length + length)
+                located = [] if before.critical is None else events(problem, before, after, length)
+                if located is not None:
+                    return after, located, length, end
+        step *= 0.5
+    return None
+
+
+def _passed(z: np.ndarray, bounds: Sequence[tuple[float, float]]) -> tuple[int, float] | None:
+    """Return the place and the bound of a parameter that has left its bounds."""
+    for place, (low, high) in zip(range(-len(bounds), 0), bounds, strict=True):
+        if not low <= z[place] <= high:
+            return place, low if z[place] < low else high
+    return None
+
+
+def _at_values(
+    problem: Problem, before: Point, after: Point, length: float, limits: Limits
+) -> Iterator[tuple[float, Point]]:
+    """Yield the solutions at requested values between two solutions, with their lengths from the first."""
+    low, high = sorted((before.value, after.value))
+    for value in limits.values:
+        if low < value < high:
+            share = (value - before.value) / (after.value - before.value)
+            guess = before.z + share * (after.z - before.z)
+            guess[-1] = value
+            point = at_value(problem, guess)
+            if point is not None:
+                h = share * length
+                critical = problem.critical(point.z)
+                yield h, Point(point.z, point.tangent, point.corrections, critical, before.length + h)

@@ -1,0 +1,152 @@
+"""Find the bifurcations on a step along a branch.
+
+The critical values of a solution are sorted by their growth.  The k-th growth of the sorted list is continuous along the
+branch, also where values meet or form a pair.  If the number of growing values changes on a step, then the growths
+between both numbers pass zero: each is the test function of one bifurcation.  Neutral saddles, at which a sum of two
+values is zero, change no number.  A branch that turns in its parameter without any change of the number touches zero
+there: the branch is born in a pitchfork.
+
+| changes on the step | bifurcation |
+|---|---|
+| a real value passes where the parameter turns | fold |
+| a real value passes elsewhere | branch point (transcritical, pitchfork) |
+| the parameter turns, a value touches zero | branch point (the branch is born in a pitchfork) |
+| a pair passes | Hopf, torus |
+| a multiplier passes -1 | period doubling |
+
+Source: Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed. (Springer, 2004), section 10.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from scipy.optimize import brentq
+
+from .arclength import Point, correct
+from .kinds import BifurcationKind
+from .problems import Critical, Problem
+
+TOGETHER = 1e-8
+"""Bifurcations nearer than this part of a step are one of higher multiplicity, or lie on a turn (a choice)."""
+
+TOUCHING = 1e-5
+"""Largest growth of the value that touches zero at a turn, relative to the largest value (a choice): it grows as the
+square of the distance, which is located to half of the digits."""
+
+REAL = 1e-7
+"""A value whose imaginary part is smaller, relative to the largest value, is real: the square root of rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """A bifurcation on a branch, before its results are computed."""
+
+    kind: BifurcationKind
+    point: Point  # with critical values
+    index: int  # of the critical value
+    multiplicity: int = 1  # of values or pairs that pass together
+
+    @property
+    def critical(self) -> complex:
+        """The value that passes; real if its imaginary part is a rounding error."""
+        critical = _critical(self.point)
+        value = complex(critical.values[self.index])
+        return value if abs(value.imag) > REAL * critical.scale else complex(value.real)
+
+
+def _critical(point: Point) -> Critical:
+    """Return the critical values of a solution that has some."""
+    if point.critical is None:
+        raise RuntimeError("critical values were not computed")
+    return point.critical
+
+
+class Step:
+    """The solutions on the hyperplanes between both ends of a step, by their distance from its beginning."""
+
+    def __init__(self, problem: Problem, before: Point, after: Point, length: float) -> None:
+        self.problem, self.before, self.length = problem, before, length
+        self.points = {0.0: before, length: after}
+
+    def at(self, distance: float) -> Point:
+        """Return the solution at a distance; ArithmeticError if Newton's method fails."""
+        if distance not in self.points:
+            guess = self.before.z + distance * self.before.tangent
+            point = correct(self.problem, guess, self.before.tangent)
+            if point is None:
+                raise ArithmeticError("no solution between two solutions of a branch")
+            critical = self.problem.critical(point.z)
+            self.points[distance] = replace(point, critical=critical, length=self.before.length + distance)
+        return self.points[distance]
+
+    def growth(self, distance: float, index: int) -> float:
+        """Return the growth of a critical value at a distance."""
+        return float(_critical(self.at(distance)).growth[index])
+
+    def turn(self, distance: float) -> float:
+        """Return the parameter's share of the tangent at a distance."""
+        return float(self.at(distance).tangent[-1])
+
+    def zero_of_growth(self, index: int) -> float:
+        """Return the distance at which the growth of a critical value passes zero."""
+        ends = self.growth(0.0, index), self.growth(self.length, index)
+        if ends[0] * ends[1] >= 0.0:  # one end is neutral to rounding
+            return 0.0 if abs(ends[0]) < abs(ends[1]) else self.length
+        return float(brentq(lambda h: self.growth(h, index), 0.0, self.length, xtol=1e-14 * self.length, rtol=1e-14))
+
+    def zero_of_turn(self) -> float:
+        """Return the distance at which the parameter turns."""
+        return float(brentq(self.turn, 0.0, self.length, xtol=1e-14 * self.length, rtol=1e-14))
+
+
+def bifurcations(problem: Problem, before: Point, after: Point, length: float) -> list[tuple[float, object]] | None:
+    """Return the bifurcations on a step with their distances from its beginning; None if the step is too long."""
+    step = Step(problem, before, after, length)
+    turned = before.tangent[-1] * after.tangent[-1] < 0.0
+    counts = sorted((_critical(before).growing, _critical(after).growing))
+    if counts[0] == counts[1] and not turned:
+        return []
+    try:
+        turn = step.zero_of_turn() if turned else None
+        located = [*_passing(step, range(*counts), turn)]
+    except ArithmeticError:
+        return None
+    if turn is not None and not any(each.kind is BifurcationKind.FOLD for _, each in located):
+        critical = _critical(step.at(turn))
+        touching = int(abs(critical.growth).argmin())
+        if abs(critical.growth[touching]) > TOUCHING * critical.scale:
+            return None  # two changes of the number cancel on this step
+        near = [h for h, each in located if abs(h - turn) < TOGETHER * length and not abs(each.critical.imag) > 0.0]
+        if not near:
+            located.append((turn, Located(BifurcationKind.BRANCH_POINT, step.at(turn), touching)))
+    return [*_together(located, length)]
+
+
+def _passing(step: Step, indices: range, turn: float | None) -> Iterator[tuple[float, Located]]:
+    """Yield a bifurcation for each critical value, or pair of values, that passes on a step."""
+    index = indices.start
+    while index < indices.stop:
+        distance = step.zero_of_growth(index)
+        critical = _critical(step.at(distance))
+        paired = abs(critical.values[index].imag) > REAL * critical.scale
+        turned = not paired and turn is not None and abs(distance - turn) < 100.0 * TOGETHER * step.length
+        if turned and turn is not None:
+            distance = turn  # a fold is located better by the turn: the value is a square root of the parameter
+        value = complex(critical.values[index])
+        kind = step.problem.kind(value if paired else complex(value.real), turned)
+        yield distance, Located(kind, step.at(distance), index)
+        index += 2 if paired else 1
+
+
+def _together(located: list[tuple[float, Located]], length: float) -> Iterator[tuple[float, object]]:
+    """Join bifurcations of one kind at one place to one of higher multiplicity."""
+    joined: list[tuple[float, Located]] = []
+    for distance, each in sorted(located, key=lambda pair: pair[0]):
+        last = joined[-1] if joined else None
+        if last and last[1].kind is each.kind and distance - last[0] < TOGETHER * length:
+            joined[-1] = (last[0], replace(last[1], multiplicity=last[1].multiplicity + 1))
+        else:
+            joined.append((distance, each))
+    yield from joined

@@ -1,0 +1,259 @@
+"""Equilibria along a parameter, as a problem that `arclength` follows.
+
+The unknowns are z = (x, s, p): state, speeds of the shifts, parameter.  The equations are r(x, p) = E s, where the
+columns of E are the shifts, and x = x_ref at one node of each shifted component.  A shift makes an eigenvalue zero; these
+are left out of the critical values.
+
+If all nodes are alike and links act by a Laplacian L, the Jacobian at equal states is A (x) I - H (x) L.  Its eigenvalues
+are those of A - lambda_k H for the eigenvalues lambda_k of L: small matrices for a network of any size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+from scipy import linalg, sparse
+from scipy.sparse.linalg import splu
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.lift import derivative
+from synchain.models.scenes.scene import Scene
+
+from ..cells.run_keywords import with_numbers
+from .arclength import Point
+from .equilibrium import Equilibrium, eigenvalues
+from .kinds import BifurcationKind
+from .linearised import Linearised
+from .problems import Critical, Matrix
+
+NOISE = 1e-14
+"""Residual that counts as zero, relative to the sizes of its terms: 45 rounding errors (a choice)."""
+
+LEAST_SCALE = 0.1
+"""Least scale of a component in lengths, relative to that of the largest component (a choice)."""
+
+BLOCKS = 1e-11
+"""Largest difference between a Jacobian and its blocks, relative to its largest entry (a choice)."""
+
+REAL = 1e-7
+"""An eigenvalue whose imaginary part is smaller, relative to the largest, is real (a choice)."""
+
+
+class ModeBlocks:
+    """The eigenvalues of a network of equal nodes by small blocks, one for each mode of its graph."""
+
+    def __init__(self, equations: Equations) -> None:
+        (layer,) = equations.layers
+        self.n, self.components = equations.n, len(equations.node.state)
+        links = [*layer.links]
+        rows, columns = np.array([i for i, _, _ in links], dtype=int), np.array([j for _, j, _ in links], dtype=int)
+        weights = np.array([float(weight) for _, _, weight in links])
+        adjacency = sparse.csr_array((weights, (rows, columns)), (self.n, self.n))
+        degrees = np.asarray(adjacency.sum(axis=1)).ravel()
+        self.laplacian = sparse.csr_array(sparse.diags_array(degrees) - adjacency)
+        self.link = (int(rows[0]), int(columns[0]), float(adjacency[rows[0], columns[0]]), float(degrees[rows[0]]))
+
+    @classmethod
+    def of(cls, equations: Equations) -> ModeBlocks | None:
+        """Return the blocks of a network, None if its links or masses allow none."""
+        alike = not equations.mixed and not equations.differing and not equations.inertial
+        return cls(equations) if alike and len(equations.layers) == 1 and equations.link_count else None
+
+    @cached_property
+    def spectrum(self) -> tuple[np.ndarray, np.ndarray]:
+        """Eigenvalues (n,) and eigenvectors (n, n) of the Laplacian, ascending."""
+        matrix = self.laplacian.toarray()
+        if np.array_equal(matrix, matrix.T):
+            values, vectors = linalg.eigh(matrix)
+            values[np.abs(values) < 1e-13 * np.abs(values).max()] = 0.0
+            return values.astype(complex), vectors.astype(complex)
+        values, vectors = linalg.eig(matrix)
+        order = np.lexsort((values.imag, values.real))
+        return values[order], vectors[:, order]
+
+    @cached_property
+    def numbers(self) -> np.ndarray:
+        """Number (n,) of the distinct eigenvalue of each mode: 0 for that of equal states."""
+        values = self.spectrum[0]
+        apart = np.abs(np.diff(values)) > 1e-9 * max(1.0, float(np.abs(values).max()))
+        return np.concatenate([[0], np.cumsum(apart)])
+
+    def matrices(self, jacobian: sparse.csc_array) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return A and H (components, components) of a Jacobian A (x) I - H (x) L, None if it has another form."""
+        i, j, weight, degree = self.link
+        places = self.n * np.arange(self.components)
+        coupling = jacobian[np.ix_(places + i, places + j)].toarray() / weight
+        own = jacobian[np.ix_(places + i, places + i)].toarray() + degree * coupling
+        rebuilt = sparse.kron(own, sparse.eye_array(self.n)) - sparse.kron(coupling, self.laplacian)
+        difference = abs(jacobian - rebuilt).max()
+        return (own, coupling) if difference <= BLOCKS * abs(jacobian).max() else None
+
+    def values(self, jacobian: sparse.csc_array) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return all eigenvalues and the mode of each, None if the Jacobian has no blocks."""
+        matrices = self.matrices(jacobian)
+        if matrices is None:
+            return None
+        own, coupling = matrices
+        values = np.linalg.eigvals(own - self.spectrum[0][:, None, None] * coupling)
+        return values.ravel(), np.repeat(np.arange(self.n), self.components)
+
+    def text(self, mode: int) -> str:
+        """Describe a mode: its number, signs of a simple one on few nodes, eigenvalue."""
+        values, vectors = self.spectrum
+        number, eigenvalue = self.numbers[mode], values[mode]
+        signs = ""
+        if (self.numbers == number).sum() == 1 and self.n <= 12:
+            vector = (vectors[:, mode] / vectors[np.abs(vectors[:, mode]).argmax(), mode]).real
+            signs = " ".join("0" if abs(x) < 1e-9 else "+" if x > 0 else "-" for x in vector) + ", "
+        shown = eigenvalue.real if abs(eigenvalue.imag) < 1e-12 else eigenvalue
+        return f"mode {number} of the graph, {signs}eigenvalue {shown:.10g}"
+
+
+class Equilibria:
+    """Equilibria of a network along one or two parameters, the last unknowns."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        equations: Equations,
+        names: tuple[str, ...],
+        state: np.ndarray,
+        shifts: tuple[str, ...],
+        speeds: np.ndarray,
+    ) -> None:
+        self.scene, self.names, self.shifts = scene, names, shifts
+        self.size = len(state)
+        self.values: Mapping[str, float] = dict(scene.parameters)
+        self.network = Linearised.of(equations, self.values)
+        self.by_parameters = [Linearised.of(derivative(equations, name), self.values) for name in names]
+        # Shifts: columns of ones, and the first node of each is pinned.
+        places = np.cumsum([0, *(len(equations.holders(name)) for name in equations.components)])
+        self.first_of = places[:-1]
+        rows = [np.arange(*places[k : k + 2]) for k in map(equations.components.index, shifts)]
+        lengths = [len(each) for each in rows]
+        indices = (np.concatenate([*rows, []]).astype(int), np.repeat(np.arange(len(rows)), lengths))
+        self.ones = sparse.csc_array((np.ones(sum(lengths)), indices), (self.size, len(rows)))
+        self.pinned = np.array([each[0] for each in rows], dtype=int)
+        pins = (np.ones(len(rows)), (np.arange(len(rows)), self.pinned))
+        self.pins = sparse.csc_array(pins, (len(rows), self.size))
+        self.blocks = ModeBlocks.of(equations)
+        self.point = np.concatenate([state, speeds, [self.values[name] for name in names]])
+        self.component_scales = np.zeros(len(equations.components))
+        self.ranges = np.array([abs(self.values[name]) or 1.0 for name in names])
+        self.weights = np.zeros(len(self.point))
+        self._weigh()
+
+    def set_ranges(self, ranges: np.ndarray) -> None:
+        """Set the lengths by which parameters are measured."""
+        self.ranges = ranges
+        self._weigh()
+
+    def _weigh(self) -> None:
+        """Measure states by the largest of each component so far, and parameters by their ranges."""
+        sizes = np.maximum.reduceat(np.abs(self.point[: self.size]), self.first_of)
+        self.component_scales = np.maximum(self.component_scales, sizes)
+        if not self.component_scales.any():  # at the origin states have no size yet
+            self.component_scales += 1.0
+        # Velocities of a network at rest are zero: their scale is a part of the others'.
+        scales = np.maximum(self.component_scales, LEAST_SCALE * self.component_scales.max())
+        counts = np.diff([*self.first_of, self.size])
+        self.weights = np.zeros(len(self.point))
+        self.weights[: self.size] = 1.0 / (np.sqrt(self.size) * np.repeat(scales, counts))
+        self.weights[len(self.weights) - len(self.names) :] = 1.0 / self.ranges
+
+    @cached_property
+    def higher(self) -> tuple[Linearised, Linearised]:
+        """The second and third derivatives of the rates along a direction."""
+        return self.network.along(2), self.network.along(3)
+
+    def split(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
+        """Return state, speeds and the values of all parameters."""
+        end = len(z) - len(self.names)
+        chosen = dict(zip(self.names, map(float, z[end:]), strict=True))
+        return z[: self.size], z[self.size : end], {**self.values, **chosen}
+
+    def bordered(self, jacobian: sparse.csc_array) -> sparse.csc_array:
+        """Return the derivative of the equations by state and speeds."""
+        if not self.shifts:
+            return jacobian
+        return sparse.csc_array(sparse.block_array([[jacobian, -self.ones], [self.pins, None]], format="csc"))
+
+    def linearise(self, z: np.ndarray) -> tuple[np.ndarray, Matrix]:
+        """Return the remaining rates and pins, and their derivatives."""
+        state, speeds, values = self.split(z)
+        network, count = self.network.at(values), len(speeds)
+        residual = np.append(network.rates(state) - self.ones @ speeds, state[self.pinned] - self.point[self.pinned])
+        jacobian = network.jacobian(state)
+        columns = [np.append(each.at(values).rates(state), np.zeros(count)) for each in self.by_parameters]
+        matrix = sparse.hstack(
+            [self.bordered(jacobian), *(sparse.csc_array(c[:, None]) for c in columns)], format="csc"
+        )
+        if not (np.isfinite(residual).all() and np.isfinite(matrix.data).all()):
+            raise ArithmeticError("a rate or its slope has no value")
+        return residual, matrix.toarray() if self.size <= 64 else sparse.csc_array(matrix)
+
+    def noise(self, z: np.ndarray) -> np.ndarray:
+        """Return the rounding errors of rates and pins."""
+        state, speeds, values = self.split(z)
+        sizes = self.network.at(values).term_sizes(state) + self.ones @ np.abs(speeds)
+        return NOISE * np.append(sizes, np.abs(state[self.pinned]))
+
+    def accept(self, z: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pin the shifts at a solution and measure lengths by it."""
+        self.point = z
+        self._weigh()
+        return z, tangent / float(np.linalg.norm(self.weights * tangent))
+
+    def critical(self, z: np.ndarray) -> Critical:
+        """Return the eigenvalues of M^-1 J without those of the shifts."""
+        state, _, values = self.split(z)
+        network = self.network.at(values)
+        jacobian, mass = network.jacobian(state), network.mass(state)
+        found = self.blocks.values(jacobian) if self.blocks is not None else None
+        numbers, modes = found or (eigenvalues(jacobian, mass), None)
+        if self.shifts:
+            others = np.argsort(np.abs(numbers), kind="stable")[len(self.shifts) :]
+            numbers, modes = numbers[others], None if modes is None else modes[others]
+        return Critical.of(numbers.real, numbers, modes)
+
+    def kind(self, value: complex, turned: bool) -> BifurcationKind:
+        """Name a bifurcation by its eigenvalue."""
+        if value.imag != 0.0:
+            return BifurcationKind.HOPF
+        return BifurcationKind.FOLD if turned else BifurcationKind.BRANCH_POINT
+
+    def solution(self, point: Point) -> Equilibrium:
+        """Return the equilibrium at a point."""
+        state, speeds, values = self.split(point.z)
+        scene = with_numbers(self.scene, {name: values[name] for name in self.names})
+        # A shift makes an eigenvalue zero.
+        critical = self.critical(point.z) if point.critical is None else point.critical
+        numbers = np.append(critical.values, np.zeros(len(self.shifts)))
+        numbers = numbers.astype(complex)[np.lexsort((-numbers.imag, -numbers.real))]
+        residual = float(np.abs(self.linearise(point.z)[0]).max())
+        return Equilibrium(scene, state, numbers, self.shifts, speeds, residual, point.corrections)
+
+    def vectors(self, z: np.ndarray, value: complex, count: int) -> np.ndarray:
+        """Return eigenvectors (states, count) of M^-1 J for an eigenvalue of some multiplicity, orthonormal."""
+        state, _, values = self.split(z)
+        network = self.network.at(values)
+        jacobian, mass = network.jacobian(state), network.mass(state)
+        mass = sparse.eye_array(self.size, format="csc") if mass is None else mass
+        # At zero the shifts are null vectors too: border the matrix, so that they are left out.
+        shifted = jacobian if value else self.bordered(jacobian)
+        size, scale = shifted.shape[0], float(abs(jacobian).max())
+        heavy = sparse.block_diag([mass, sparse.csc_array((size - self.size,) * 2)], format="csc")
+        # Inverse iteration beside the eigenvalue.
+        matrix = sparse.csc_array(shifted - (value + 1e-10 * scale * (1.0 + 0.3j)) * heavy)
+        solver = splu(matrix.astype(complex))
+        basis = np.random.default_rng(0).normal(size=(size, count)).astype(complex)
+        for _ in range(4):
+            basis, _ = np.linalg.qr(solver.solve(heavy @ basis))
+        basis, _ = np.linalg.qr(basis[: self.size])
+        if value:
+            return basis
+        # A real null space: real vectors, the largest entry positive.
+        real = np.linalg.svd(np.hstack([basis.real, basis.imag]), full_matrices=False)[0]
+        return real[:, :count]

@@ -1,0 +1,68 @@
+"""What the continuation of equilibria, cycles and curves of bifurcations has in common.
+
+A problem is a system of equations R(z) = 0 with one unknown more than equations, so that its solutions form curves.
+The last unknown is the parameter.  `arclength` solves and follows any problem, `detection` finds the bifurcations.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol, TypeAlias
+
+import numpy as np
+from scipy import sparse
+
+from .kinds import BifurcationKind
+
+Matrix: TypeAlias = np.ndarray | sparse.csc_array
+
+
+class Critical(NamedTuple):
+    """Eigenvalues or multipliers of a solution that decide its stability, without those that are always neutral."""
+
+    growth: np.ndarray  # (k,): distance past neutrality, real part or |multiplier| - 1; the largest first
+    values: np.ndarray  # (k,) complex, in the same order
+    blocks: np.ndarray  # (k,): index of the mode of the graph; -1 if a value belongs to the whole network
+
+    @classmethod
+    def of(cls, growth: np.ndarray, values: np.ndarray, blocks: np.ndarray | None = None) -> Critical:
+        """Sort values by their growth; the members of a pair have equal growth and stay together."""
+        blocks = np.full(len(values), -1) if blocks is None else blocks
+        order = np.lexsort((-values.imag, np.abs(values.imag), -growth))
+        return cls(growth[order], values[order], blocks[order])
+
+    @property
+    def scale(self) -> float:
+        """Largest modulus of the values, the unit of their rounding errors."""
+        return float(np.abs(self.values).max(initial=0.0)) or 1.0
+
+    @property
+    def growing(self) -> int:
+        """Number of values past neutrality by more than rounding."""
+        return int((self.growth > ROUNDING * self.scale).sum())
+
+
+ROUNDING = 1e-12
+"""Growth that counts as zero, relative to the largest value: some thousand rounding errors (a choice)."""
+
+
+class Problem(Protocol):
+    """Equations R(z) = 0 whose solutions form a curve; z ends with the parameters `names`."""
+
+    names: tuple[str, ...]
+    point: np.ndarray  # (size + 1,): the last accepted solution
+    weights: np.ndarray  # (size + 1,): lengths are norms of `weights * dz`
+
+    def linearise(self, z: np.ndarray) -> tuple[np.ndarray, Matrix]:
+        """Return R (size,) and its derivative (size, size + 1); ArithmeticError where there is no value."""
+
+    def noise(self, z: np.ndarray) -> np.ndarray:
+        """Return for each equation the largest residual (size,) that counts as zero."""
+
+    def accept(self, z: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Make a solution the reference of the next ones; return it and its tangent in the unknowns that follow."""
+
+    def critical(self, z: np.ndarray) -> Critical:
+        """Return what decides the stability of a solution."""
+
+    def kind(self, value: complex, turned: bool) -> BifurcationKind:
+        """Name the bifurcation at which a critical value passes; `turned` if the branch turns in its parameter."""

@@ -1,0 +1,212 @@
+"""Branches of equilibria against closed forms and numbers from other code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import synchain as sc
+from synchain.runtime.bifurcation import equilibria as module
+from synchain.runtime.bifurcation.results import Branch
+
+CELL = sc.Field({"x": "x - x**3"})
+PULL = sc.Rates({"x": "K*W*(x_j - x_i)"}, {"K": 0.2})
+MACHINE = sc.Field({"delta": "w", "w": "P - w/2"}, parameters={"P": 0})
+LINE = sc.Rates({"w": "K*W*sin(delta_j - delta_i)"}, {"K": 3})
+POWERS = [1.0, -0.6, 0.4, -1.1, 0.3]
+
+
+def brusselators(n: int = 6, B: float = 2.0) -> sc.Scene:
+    node = sc.Field({"x": "2 - (B + 1)*x + x**2*y", "y": "B*x - x**2*y"}, parameters={"B": B})
+    link = sc.Rates({"x": "Dx*W*(x_j - x_i)", "y": "Dy*W*(y_j - y_i)"}, {"Dx": 0.1, "Dy": 1})
+    return sc.Scene(node, link, sc.ring(n), initial={"x": 2, "y": B / 2})
+
+
+def jansen_rit() -> sc.Scene:
+    """Rates of Jansen & Rit, Biol. Cybern. 73, 357 (1995), table 1."""
+    rate = lambda v: f"5/(1 + exp({sp.Rational(56, 100)}*(6 - {v})))"  # noqa: E731
+    rates = {
+        "a": "u", "u": f"325*{rate('(b - c)')} - 200*u - 10000*a",
+        "b": "v", "v": f"325*(p + 4*C/5*{rate('(C*a)')}) - 200*v - 10000*b",
+        "c": "w", "w": f"1100*C/4*{rate('(C*a/4)')} - 100*w - 2500*c",
+    }  # fmt: skip
+    return sc.Scene(sc.Field(rates, parameters={"p": -60, "C": 135}), initial=dict.fromkeys("aubvcw", 0))
+
+
+def values_of(branch: Branch, kind: str) -> list[float]:
+    return [each.value for each in branch.points[kind]]
+
+
+def test_two_bistable_cells_in_closed_form() -> None:
+    """Branch points at K = 1/2 (x = 0) and 1/3 (x = -y = 1/sqrt 3); beyond, x, y = (sqrt .4 +- sqrt 1.2)/2 at K = 0.2."""
+    scene = sc.Scene(CELL, PULL, sc.chain(2), initial={"x": 0})
+    trivial = sc.follow(sc.equilibrium(scene), "K", to=0.7)
+    (half,) = trivial.bifurcations
+    assert half.kind == "branch point"
+    assert half.value == pytest.approx(0.5, abs=1e-13)
+    assert half.mode == "mode 1 of the graph, + -, eigenvalue 2"
+    opposite = sc.follow(half, "K", within=(0.2, 0.7))
+    np.testing.assert_allclose(values_of(opposite, "branch point"), [1 / 3, 1 / 3], atol=1e-13)
+    assert opposite.points["branch point"][0].solution.state == pytest.approx([3**-0.5, -(3**-0.5)], abs=1e-12)
+    mixed = sc.follow(opposite.points["branch point"][0], "K", within=(0.2, 0.7))
+    expected = [(0.4**0.5 + 1.2**0.5) / 2, (0.4**0.5 - 1.2**0.5) / 2]
+    assert sorted(np.abs(mixed[0].state)) == pytest.approx(sorted(np.abs(expected)), abs=1e-13)
+    assert [mixed[k].growing for k in (0, -1)] == [1, 1]
+
+
+def test_a_branch_that_is_born_in_a_pitchfork_turns_there() -> None:
+    scene = sc.Scene(CELL, PULL, sc.chain(2), initial={"x": [0.9, -0.9]})
+    branch = sc.follow(sc.equilibrium(scene, K=0.4), "K", to=0.7)
+    (born,) = branch.bifurcations
+    assert born.kind == "branch point"
+    assert born.value == pytest.approx(0.5, abs=1e-13)
+    np.testing.assert_allclose(branch[-1].state, -branch[0].state, atol=1e-12)
+    assert branch.ends == ("K = 0.4",)
+
+
+def test_six_brusselators_on_a_ring() -> None:
+    branch = sc.follow(sc.equilibrium(brusselators()), "B", to=5.6)
+    kinds = [str(each.kind) for each in branch.bifurcations]
+    assert kinds == ["branch point", "branch point", "Hopf", "branch point"]
+    np.testing.assert_allclose([each.value for each in branch.bifurcations], [2.8, 91 / 30, 5.0, 5.5], rtol=1e-12)
+    assert [each.multiplicity for each in branch.bifurcations] == [1, 2, 1, 2]
+    assert [each.mode[:6] for each in branch.bifurcations] == ["mode 3", "mode 2", "mode 0", "mode 1"]
+    assert "+ - + - + -, eigenvalue 4" in branch.bifurcations[0].mode
+    assert branch.bifurcations[2].frequency == pytest.approx(2.0, abs=1e-12)
+    # Kuznetsov (2004), section 3.5.2 gives the coefficient of Brusselators up to the scale of the eigenvector: here negative.
+    assert branch.bifurcations[2].lyapunov < 0
+    board = sc.follow(branch.bifurcations[0], "B", within=(2.0, 3.2))
+    for k in (0, -1):
+        assert sorted(set(np.round(board[k].state[:6], 12))) == pytest.approx([1.120925826188285, 2.879074173811715])
+        assert board[k].stable
+        assert board[k].eigenvalues[0].real == pytest.approx(-0.537909676162, abs=1e-11)
+
+
+def test_a_double_branch_point_has_a_branch_for_each_class_of_symmetry() -> None:
+    """Mode 1 of a ring of six: reflections through two nodes, or through two links, leave a line each."""
+    branch = sc.follow(sc.equilibrium(brusselators()), "B", to=5.6)
+    _, two, _, one = branch.bifurcations
+    assert (len(two.vectors), len(one.vectors)) == (1, 2)
+    for bifurcation in (two, one):
+        for k in range(len(bifurcation.vectors)):
+            other = sc.follow(bifurcation, "B", within=(bifurcation.value - 0.05, bifurcation.value + 0.05), vector=k)
+            assert np.ptp(other[-1].state[:6]) > 0.01
+            assert max(each.residual for each in other) < 1e-12
+
+
+def test_folds_and_hopf_points_of_jansen_and_rit() -> None:
+    """Hopf points by Hurwitz' determinant; the neutral saddle at p = 96.762 is no bifurcation."""
+    branch = sc.follow(sc.equilibrium(jansen_rit()), "p", to=400)
+    np.testing.assert_allclose(values_of(branch, "fold"), [113.5862732127988, -41.30141048782859], rtol=1e-13)
+    np.testing.assert_allclose(
+        values_of(branch, "Hopf"), [-12.14749234842, 89.82910796964, 315.69642806882], rtol=1e-12
+    )
+    frequencies = [each.frequency for each in branch.points["Hopf"]]
+    np.testing.assert_allclose(frequencies, [45.48700707948, 65.20098196626, 70.14278420402], rtol=1e-12)
+    assert len(branch.bifurcations) == 5
+    assert all(each.residual < 1e-12 for each in branch.bifurcations)
+
+
+def test_a_grid_of_machines_folds_with_a_neutral_shift() -> None:
+    scene = sc.Scene(MACHINE, LINE, sc.ring(5), parameters={"P": POWERS})
+    branch = sc.follow(sc.equilibrium(scene), "K", to=0.3)
+    (fold,) = branch.bifurcations
+    assert (str(fold.kind), branch.ends) == ("fold", ("K = 3",))
+    assert fold.value == pytest.approx(0.65565648344943, abs=1e-13)
+    angles = fold.solution.state[:5] - fold.solution.state[:5].mean()
+    expected = [1.1414659473, -0.2728635999, -0.3455983930, -1.0971130613, 0.5741091070]
+    np.testing.assert_allclose(angles, expected, atol=1e-10)
+    assert (branch.growing[0], branch.growing[-1]) == (0, 1)
+
+
+def test_a_parameter_of_one_node_is_followed() -> None:
+    """sin(delta_1 - delta_2) = (P_1 - P_2)/(2 K) in the frame of the pair."""
+    pair = sc.Scene(MACHINE, LINE, sc.chain(2), parameters={"P": [0.5, -0.5], "K": 1.0})
+    branch = sc.follow(sc.equilibrium(pair), "P_1", to=3.0, values=[1.0])
+    (fold,) = branch.bifurcations
+    assert fold.value == pytest.approx(1.5, abs=1e-13)
+    (at_one,) = (each for value, each in zip(branch.values, branch, strict=True) if value == 1.0 and each.stable)
+    assert at_one.state[0] - at_one.state[1] == pytest.approx(np.arcsin(0.75), abs=1e-12)
+    assert at_one.speeds == pytest.approx([0.5], abs=1e-13)
+
+
+def test_hopf_points_of_modes_in_closed_form() -> None:
+    """FitzHugh-Nagumo with links in v: the mode lambda is neutral at v = -sqrt(.936 - D lambda)."""
+    node = sc.Field({"v": "v - v**3/3 - w + I", "w": "2/25*(v + 7/10 - 4/5*w)"}, parameters={"I": 0.2})
+    link = sc.Rates({"v": "D*W*(v_j - v_i)"}, {"D": 0.05})
+    scene = sc.Scene(node, link, sc.ring(4), initial={"v": -1.1, "w": -0.5})
+    branch = sc.follow(sc.equilibrium(scene), "I", to=0.45)
+    values = values_of(branch, "Hopf")
+    np.testing.assert_allclose(values[:2], [0.331281337455, 0.391624018433], atol=1e-11)
+    first, second, *_ = branch.points["Hopf"]
+    assert (first.multiplicity, second.multiplicity) == (1, 2)
+    np.testing.assert_allclose([first.frequency, second.frequency], 0.275506805724, atol=1e-11)
+
+
+def test_amplitude_death_is_bounded_by_hopf_points() -> None:
+    """Two Stuart-Landau oscillators of frequencies 1 +- D/2 rest between K = 1 and (1 + D^2/4)/2 for D = 3."""
+    rates = {"x": "x - w*y - (x**2 + y**2)*x", "y": "w*x + y - (x**2 + y**2)*y"}
+    node = sc.Field(rates, parameters={"w": 1})
+    link = sc.Rates({"x": "K*W*(x_j - x_i)", "y": "K*W*(y_j - y_i)"}, {"K": 0.5})
+    scene = sc.Scene(node, link, sc.chain(2), initial={"x": 0, "y": 0}, parameters={"w": [2.5, -0.5]})
+    branch = sc.follow(sc.equilibrium(scene), "K", to=2.0)
+    np.testing.assert_allclose(values_of(branch, "Hopf"), [1.0, 1.625], atol=1e-12)
+    assert [each.multiplicity for each in branch.bifurcations] == [2, 1]
+    assert branch.bifurcations[1].frequency == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_the_first_lyapunov_coefficient_of_a_normal_form(sign: int) -> None:
+    """z' = (b + i w) z + (c + i) |z|^2 z has the coefficient 2 c/w for <q, q> = 1: |z|^2 is twice the product of q."""
+    c, w = sp.Rational(3 * sign, 10), 2
+    square = "(x**2 + y**2)"
+    node = sc.Field(
+        {"x": f"b*x - {w}*y + {square}*(({c})*x - y)", "y": f"{w}*x + b*y + {square}*(({c})*y + x)"},
+        parameters={"b": -0.5},
+    )
+    branch = sc.follow(sc.equilibrium(sc.Scene(node, None, initial={"x": 0, "y": 0})), "b", to=0.5)
+    (hopf,) = branch.points["Hopf"]
+    assert hopf.lyapunov == pytest.approx(2 * 2 * float(c) / (2 * w), abs=1e-9)
+
+
+def test_blocks_of_modes_and_the_whole_matrix_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = sc.equilibrium(brusselators(8))
+    by_blocks = sc.follow(first, "B", to=5.6)
+    monkeypatch.setattr(module.ModeBlocks, "of", classmethod(lambda cls, equations: None))
+    dense = sc.follow(first, "B", to=5.6)
+    assert [str(each.kind) for each in by_blocks.bifurcations] == [str(each.kind) for each in dense.bifurcations]
+    for one, other in zip(by_blocks.bifurcations, dense.bifurcations, strict=True):
+        assert one.value == pytest.approx(other.value, abs=1e-8)
+        assert one.multiplicity == other.multiplicity
+
+
+def test_branches_open_as_they_were_saved(tmp_path: Path) -> None:
+    branch = sc.follow(sc.equilibrium(brusselators()), "B", to=3.0)
+    branch.save(tmp_path / "branch.nc")
+    opened = sc.open_result(tmp_path / "branch.nc")
+    assert isinstance(opened, Branch)
+    np.testing.assert_array_equal(opened.values, branch.values)
+    assert opened.bifurcations[0].text == branch.bifurcations[0].text
+    np.testing.assert_array_equal(opened.bifurcations[0].vectors, branch.bifurcations[0].vectors)
+    branch.bifurcations[0].save(tmp_path / "point.nc")
+    again = sc.follow(sc.open_result(tmp_path / "point.nc"), "B", to=3.0)
+    assert again.values[-1] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("B", {}, "found no end for B; expected to=, values= or within="),
+        ("b", {"to": 3}, "unknown parameter 'b'; known: "),
+        ("B", {"to": 2}, "the value of the first solution; expected another value"),
+        ("B", {"within": (3, 4)}, "found B = 2 of the first solution outside"),
+        ("B", {"within": (4, 3)}, "expected two numbers, the lower one first"),
+        ("B", {"to": 3, "direction": "left"}, "direction: found 'left'; expected 'both', 'up' or 'down'"),
+    ],
+)
+def test_what_is_refused(name: str, options: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        sc.follow(sc.equilibrium(brusselators()), name, **options)
