@@ -16,10 +16,22 @@ from ..simd.lanes import native_width
 
 
 class KernelKind(StrEnum):
-    """Task of a kernel: the cells of a sweep, or orbits and the modes carried along each."""
+    """Task of a kernel: the cells of a sweep, orbits and the modes carried along each, or the directions of a frame."""
 
     SWEEP = "sweep"
     MODES = "modes"
+    FRAME = "frame"
+
+
+ENTRIES = {KernelKind.SWEEP: "drive", KernelKind.MODES: "march", KernelKind.FRAME: "drive_frame"}
+"""Name of the function that runs cells, orbits or directions."""
+
+GROUPS = {
+    KernelKind.SWEEP: (0, 4, 10),  # input, output
+    KernelKind.MODES: (0, 4, 7, 10, 21, 23),  # input, deviations, output, propagation, framing
+    KernelKind.FRAME: (0, 4, 10, 18),  # input, output, framing
+}
+"""Ends of the groups of arrays that an entry takes as tuples."""
 
 
 RECORDERS = {
@@ -60,7 +72,9 @@ class Driver:
 
     def __str__(self) -> str:
         traits = [name for name in ("looped", "contacts", "series") if getattr(self, name)]
-        subject = "orbits and their modes" if self.kind is KernelKind.MODES else "sweeps"
+        subject = {"sweep": "sweeps", "modes": "orbits and their modes", "frame": "frames of lifted networks"}[
+            self.kind
+        ]
         return f"driver of {_list(subject, self.width, *traits)}"
 
     @property
@@ -76,13 +90,12 @@ class Driver:
 
     @property
     def entry(self) -> str:
-        """Name of the function that runs cells or orbits."""
-        return "march" if self.kind is KernelKind.MODES else "drive"
+        """Name of the function that runs cells, orbits or directions."""
+        return ENTRIES[self.kind]
 
     def grouped(self, arrays: Sequence[Any]) -> Iterator[tuple[Any, ...]]:
-        """Return the tuples that the entry takes: input, deviations if there are modes, output, propagation, framing."""
-        ends = (0, 4, 7, 10, 21, 23) if self.kind is KernelKind.MODES else (0, 4, 10)
-        return (tuple(arrays[first:last]) for first, last in pairwise(ends))
+        """Return the tuples of arrays that the entry takes."""
+        return (tuple(arrays[first:last]) for first, last in pairwise(GROUPS[self.kind]))
 
     @property
     def text(self) -> str:
@@ -95,7 +108,8 @@ class Driver:
             "SERIES": self.series,
         }
         contacts, landings = (["contacts"], ["landings"]) if self.contacts else ([], [])
-        last = ["propagators", *landings, "frames", "modes"] if modes else ["spread", "sweep"]
+        frames = ["frames", "lifted_frames"] if self.kind is KernelKind.FRAME else []
+        last = ["propagators", *landings, "frames", "modes"] if modes else ["spread", "sweep", *frames]
         pieces = (f"driver.{name}" for name in ("dense", "cells", "control", *contacts, *last))
         return _module(str(self), tuple(constants.items()), tuple(pieces))
 

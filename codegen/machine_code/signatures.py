@@ -38,7 +38,8 @@ def signatures(driver: Driver) -> dict[str, Any]:
     taken, arguments, outputs = _of_modes(driver) if driver.kind is KernelKind.MODES else _of_sweep(driver)
     functions = FunctionsType({name: taken[name] for name in driver.functions})
     # functions, arguments of the scene, first and last cell, arrays
-    entry = types.void(functions, *arguments, INTEGER, INTEGER, ROWS, *map(types.Tuple, outputs))
+    rows = types.Tuple((MATRIX, MATRIX, MATRIX, VECTOR)) if driver.kind is KernelKind.FRAME else ROWS
+    entry = types.void(functions, *arguments, INTEGER, INTEGER, rows, *map(types.Tuple, outputs))
     return {**taken, driver.entry: entry}
 
 
@@ -72,7 +73,10 @@ def _of_sweep(driver: Driver) -> tuple[dict[str, Any], tuple[Any, ...], tuple[An
         **recorder_signatures(driver.width),
     }
     arguments = (_sizes(Dimensions), VECTOR, MATRIX, types.Tuple(network))  # sizes, multiplicity, rule, network
-    return taken, arguments, ((MATRIX, MATRIX, COUNTS, CUBE, CUBE, MATRIX),)  # the fields of `Results`
+    results = (MATRIX, MATRIX, COUNTS, CUBE, CUBE, MATRIX)  # the fields of `Results`
+    # of a frame: batches, plan, frame, places, units, basis, sums, steps
+    framing = (CELLS, CELLS, MATRIX, COUNTS, VECTOR, MATRIX, MATRIX, CELLS)
+    return taken, arguments, (results, framing) if driver.kind is KernelKind.FRAME else (results,)
 
 
 def _of_modes(driver: Driver) -> tuple[dict[str, Any], tuple[Any, ...], tuple[Any, ...]]:

@@ -285,22 +285,27 @@ def _slope(edge: Edge, orbit: Equations, c: int, d: int) -> sp.Matrix:
     return sp.Matrix(edge.jacobian_there())[:rows, :columns].xreplace(values)
 
 
-def phase_shifted(variation: Variation) -> Variation:
+def clock_shifted(equations: Equations) -> Equations:
     """Return the same equations with t + `PHASE` in place of the time t; `PHASE` is a new parameter."""
 
-    def later(e: sp.Expr) -> sp.Expr:
-        return e.xreplace({TIME: TIME + PHASE})
-
     def of_node(node: Node) -> Node:
-        return replace(node, parameters=(*node.parameters, PHASE)).map(later)
+        return replace(node, parameters=(*node.parameters, PHASE)).map(_later)
 
     def of_edge(edge: Edge) -> Edge:
-        return replace(edge, parameters=(*edge.parameters, PHASE)).map(later) if edge.forced else edge
+        return replace(edge, parameters=(*edge.parameters, PHASE)).map(_later) if edge.forced else edge
 
-    orbit = variation.orbit.map_templates(of_node, of_edge)
-    matrix = tuple((key, later(e)) for key, e in variation.matrix)
-    events = None if variation.events is None else variation.events.map(later)
-    return replace(variation, orbit=orbit, matrix=matrix, events=events)
+    return equations.map_templates(of_node, of_edge)
+
+
+def phase_shifted(variation: Variation) -> Variation:
+    """Return the same variational equation along the orbit of `clock_shifted`."""
+    matrix = tuple((key, _later(e)) for key, e in variation.matrix)
+    events = None if variation.events is None else variation.events.map(_later)
+    return replace(variation, orbit=clock_shifted(variation.orbit), matrix=matrix, events=events)
+
+
+def _later(e: sp.Expr) -> sp.Expr:
+    return e.xreplace({TIME: TIME + PHASE})
 
 
 def with_volume(equations: Equations) -> Equations:

@@ -5,10 +5,10 @@ enough if every direction remains longer than the error of the integration. Unde
 the velocity deviations of oscillators that stick decay so fast that no block is short enough. The
 exponents of such lost directions are not reported as numbers. Only the sum of the lost exponents can be
 computed: the sum of all exponents is the mean divergence of the equations, which is integrated along the
-orbit. If a single exponent is lost, the difference gives it.
+orbit of up to eight oscillators. If a single exponent is lost, the difference gives it.
 
-`TangentFrame` holds the orbit (`orbits.OrbitProblem`, an integrator) and the orthogonal deviations.
-`lyapunov_spectrum` makes a frame, runs the transient, chooses the length of blocks, and averages the growth.
+`TangentFrame` holds the orbit and the orthogonal deviations (an integrator, the length of blocks).
+`lyapunov_spectrum` makes a frame, runs the transient, lets the frame choose its blocks, and averages the growth.
 
 Under set-valued friction, stick makes the velocity of a deviation zero, so that directions vanish
 within finite time. The exponent of a vanished direction is -inf by definition, and so is the sum. At the end
@@ -21,15 +21,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-import sympy as sp
 import xarray as xr
 
-from synchain.codegen.driver.columns import Control
-from synchain.models.dynamics.reduction import without_drive
-from synchain.models.dynamics.variational import PHASE, Variation, network_variation, phase_shifted, with_volume
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
@@ -38,42 +34,17 @@ from ..results.labelled import Labelled, dataset
 from ..support.error_text import with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
-from .averages import TOLERANCE_RATIO, TRIED, Averaging, Batches, document_keywords, error_of_steps
-from .motion import rates_of
-from .orbits import LOOKS, OrbitProblem
+from .averages import Averaging, Batches, document_keywords
 from .slow_motion import warn_of_slow_motion
-from .variational_integrator import VariationalIntegrator
+from .tangent_frame import TangentFrame
 
 __all__ = ["Lyapunov", "lyapunov_spectrum"]
-
-PARTS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
-"""Numbers of blocks in a period that are tried, in ascending order."""
-
-ENOUGH = 64
-"""More than ENOUGH blocks in a period are tried only if the next direction is longer than ROUNDING (a choice)."""
-
-TRIAL = 4
-"""Number of periods of each trial, and number of periods that are dropped after the choice."""
-
-CLEAR = 1e4
-"""A direction is resolved if it is longer than CLEAR rtol after a block (a choice)."""
-
-UNIT = 1024
-"""Units of deviations are powers of UNIT. UNIT is a power of two, so that no digit is lost, and so large that
-components
-of usual sizes share one unit."""
 
 CALL = 8
 """Number of periods of the transient in one call; growth without bound is seen from call to call (a choice)."""
 
-LOOKED = 2
-"""Number of drive periods in which the extent of a motion is measured."""
-
 LARGEST_RTOL = 1e-5
 """Largest rtol that is accepted: with a larger one no direction is resolved."""
-
-ROUNDING = 1e-13
-"""A direction of this length consists of rounding errors alone; only shorter blocks may resolve it."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -98,8 +69,9 @@ class Lyapunov(Labelled):
         Exponents of these parts, which show whether the average has converged.
     divergence : float
         Mean divergence along the orbit, which is the sum of all exponents of the network. Under
-        set-valued friction, the computed exponents are added instead: the sum is -inf if an oscillator
-        has stuck, and nan if not all exponents are computed.
+        set-valued friction, above eight oscillators, for several kinds of oscillators and with mass matrices,
+        the computed exponents are added instead: the sum is -inf if a direction vanishes, and nan if not all
+        exponents are computed.
     divergence_error : float
         Standard error of `divergence`.
     time : float
@@ -214,7 +186,7 @@ def lyapunov_spectrum(
     Parameters
     ----------
     scene : Scene
-        Network of at most eight oscillators.
+        Network of any size; of at most eight oscillators with set-valued friction.
     count : int, optional
         Number of largest exponents; all by default.
     {average}
@@ -233,17 +205,35 @@ def lyapunov_spectrum(
     Raises
     ------
     ValueError
-        If there are more than eight oscillators, if `count` exceeds the number of exponents, if `rtol` is
-        too large, or if time enters the equations without a known period.
+        If there are more than eight oscillators with set-valued friction, if `count` exceeds the number of
+        exponents, if `rtol` is too large, or if time enters the equations without a known period.
     FloatingPointError
         If the integration fails.
+
+    References
+    ----------
+    Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15, 9 and 21 (1980).
+
+    See Also
+    --------
+    exponents : transversal exponents of the synchronous motion of a network of any size.
+    cluster_exponents : exponents within and across clusters.
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> lorenz = sc.Field({"x": "10*(y - x)", "y": "28*x - y - x*z", "z": "x*y - 8*z/3"}, initial={"x": 1, "z": 20})
+    >>> found = sc.lyapunov_spectrum(sc.Scene(lorenz, None), transient=50, precision=0.05, show_progress=False)
+    >>> round(float(found.exponent.sum()), 6), bool(abs(found.exponent[0] - 0.906) < 3 * found.stderr[0])
+    (-13.666667, True)
     """
     execution = Execution(1, None, show_progress, progress)
     averaging = Averaging.for_scene(scene, precision, periods, transient, seed, execution)
     given = Given(lyapunov_spectrum, parameters, more, ONE_ORBIT)
     scene = given.scene(scene, rtol=scene.rtol if rtol is None else rtol)
     reporter = averaging.reporter()
-    dimension = scene.n * len(scene.equations.nodes[0].continuous)
+    equations = scene.equations
+    dimension = sum(len(equations.nodes[kind].continuous) for kind in equations.kind_of)
     if count is not None and not 1 <= check_integer("count", count, -dimension) <= dimension:
         raise ValueError(f"count = {count}; expected 1 … {dimension}, the components of the network's state")
     frame = TangentFrame.make(scene, dimension if count is None else count, averaging.seed)
@@ -268,21 +258,25 @@ def lyapunov_spectrum(
             batches.extend(growths[:, None], parts)
         steps = frame.error_of_steps()
     orbit = frame.integrator
-    warn_of_slow_motion(frame.variation.orbit, orbit.state, orbit.parameter_values[0], batches.time)
+    warn_of_slow_motion(equations, orbit.state[:, : equations.dimension], _values(scene), batches.time)
     return _report(frame, batches, lost, steps)
+
+
+def _values(scene: Scene) -> np.ndarray:
+    return np.array([scene.parameters[name] for name in scene.equations.parameters])
 
 
 def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray, steps: np.ndarray) -> Lyapunov:
     """Return the result of an average; all exponents after a lost direction count as lost too."""
     resolved = ~np.logical_or.accumulate(lost)
     mean, error = batches.mean()[0], np.hypot(batches.error_by_start()[0], steps)
-    unknown = np.nan if frame.variation.events is None else 0.0
+    unknown = 0.0 if frame.orbit.sticks else np.nan
     exponent, spread = np.where(resolved, mean[:-1], -np.inf), np.where(resolved, error[:-1], unknown)
     order = np.argsort(-exponent, kind="stable")
     lengths, running = batches.running()
     time, volume = batches.time, (float(mean[-1]), float(error[-1]))
-    if frame.variation.events is not None:  # stick makes volumes zero: use the sum of all exponents
-        complete = len(exponent) == frame.variation.size
+    if not frame.volumes:  # of set-valued friction, whose stick makes volumes zero, and of lifted networks
+        complete = len(exponent) == frame.size
         volume = (float(exponent.sum()), float(np.hypot.reduce(spread))) if complete else (math.nan, math.nan)
     return Lyapunov(
         exponent[order],
@@ -293,121 +287,6 @@ def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray, steps: np.n
         *volume,
         time=time,
         block=frame.unit / frame.parts,
-        components=frame.variation.size,
-        unit=str(frame.problem.turns),
+        components=frame.size,
+        unit=str(frame.turns),
     )
-
-
-@dataclass(slots=True)
-class TangentFrame:
-    """One orbit with orthogonal deviations, advanced over blocks of 1/parts of a period."""
-
-    problem: OrbitProblem  # network with the variational equation of all its states
-    integrator: VariationalIntegrator  # integrator of the orbit and its deviations
-    count: int  # number of deviations
-    parts: int = 1  # blocks in a period
-    phase: int = 0  # block within the period
-
-    @classmethod
-    def make(cls, scene: Scene, count: int, seed: int) -> TangentFrame:
-        """Return a frame at the scene's start, with random directions."""
-        network = network_variation(without_drive(scene.equations, scene.parameters))
-        sticks = network.events is not None
-        # append the logarithms of volumes to the states of the orbit, unless stick makes volumes zero
-        variation = network if sticks else Variation(with_volume(network.orbit), network.size, network.matrix)
-        variation = phase_shifted(variation) if variation.orbit.forced else variation
-        hidden = 0 if sticks else scene.n
-        start = np.array([[*scene.y0, *(0.0 for _ in range(hidden))]])
-        problem = OrbitProblem.of(scene, variation, np.zeros((count, 0)), start)
-        state = problem.with_slip_states(start)
-
-        # measure the extent of the motion; in units of the extent, all components of a deviation have similar sizes
-        if problem.forced:
-            first = cls.begin(problem, state, count, seed)
-            first.parts, states = LOOKS, [state[0]]
-            for _ in range(LOOKED * LOOKS):
-                first.advance(np.ones(1, dtype=np.int64))
-                states.append(first.integrator.state[0])
-            turns = problem.turns._replace(extent=np.ptp(states, axis=0)[: len(states[0]) - hidden])
-        else:
-            rates = rates_of(network.orbit, dict(scene.parameters))
-            turns = problem.observed_turns(state, problem.strengths, rates, hidden)
-        if not sticks:
-            problem = replace(problem, variation=_scaled(variation, turns.extent))
-        problem = problem.with_turns(turns, start)
-        return cls.begin(problem, state, count, seed)
-
-    @classmethod
-    def begin(cls, problem: OrbitProblem, state: np.ndarray, count: int, seed: int) -> TangentFrame:
-        """Return a frame at a state (1, components), with random orthonormal directions."""
-        integrator, size = problem.integrator(state), problem.variation.size
-        integrator.vectors[:] = 0.0  # also in the lanes behind the last direction
-        integrator.vectors[0, :, :count] = np.linalg.qr(np.random.default_rng(seed).normal(size=(size, count)))[0]
-        return cls(problem, integrator, count)
-
-    @property
-    def variation(self) -> Variation:
-        """The variational equation of the network."""
-        return self.problem.variation
-
-    @property
-    def unit(self) -> float:
-        """Unit of time: the period of the drive, or the mean return time of undriven motion."""
-        return self.problem.unit
-
-    @property
-    def rtol(self) -> float:
-        """Relative tolerance of the integration."""
-        return float(self.integrator.control[Control.RTOL])
-
-    def advance(self, batches: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Advance by batches (b,) of blocks; return growths (b, count + 1), least lengths (count,), lost (count,).
-
-        The last column of the growths is that of the volume. The least length of a direction is that at the end of a
-        block, before normalisation, at most 1. A direction is lost if it is shorter than the error after a block.
-        """
-        names, frame = self.variation.orbit.parameters, np.zeros((4, self.count))
-        shift = names.index(PHASE.name) if PHASE.name in names else -1
-        volumes = 0 if self.variation.events is not None else self.problem.scene.n
-        frame[0] = np.inf
-        plan = np.array([self.parts, self.phase, shift, volumes])
-        growths = self.integrator.orthogonal(self.unit / self.parts, batches, plan, frame)
-        self.phase = int(plan[1])
-        return growths, frame[0], frame[1] > 0.0
-
-    def error_of_steps(self) -> np.ndarray:
-        """Advance by TRIED periods; return the error of all growth rates (count + 1,) due to the steps."""
-        usual, looser, single = [], [], np.ones(1, dtype=np.int64)
-        for _ in range(TRIED * self.parts):
-            phase = self.phase
-            with self.integrator.loosened(TOLERANCE_RATIO):
-                looser.append(self.advance(single)[0][0])
-            self.phase = phase
-            usual.append(self.advance(single)[0][0])
-        return error_of_steps(usual, looser, self.unit / self.parts)
-
-    def choose_block(self) -> None:
-        """Choose the smallest number of blocks in a period for which most directions are resolved."""
-        best, fewest = -1, 1
-        for parts in PARTS:
-            self.parts, self.phase = parts, 0
-            # a direction counts as resolved if it and all directions before it are longer than the error in every block
-            _, least, _ = self.advance(np.array([TRIAL * parts]))
-            clear = np.logical_and.accumulate(least > CLEAR * self.rtol)
-            if clear.sum() > best:
-                best, fewest = int(clear.sum()), parts
-            if best == self.count or (parts >= ENOUGH and least[best] < ROUNDING):
-                break
-        self.parts, self.phase = fewest, 0
-        self.advance(np.array([TRIAL * fewest]))
-
-
-def _scaled(variation: Variation, extent: np.ndarray) -> Variation:
-    """Return the variational equation in units of the extent of each component, rounded to powers of UNIT."""
-    moving = extent[: variation.size] > 0.0
-    if not moving.any():
-        return variation
-    logarithms = np.log(np.where(moving, extent[: variation.size], 1.0)) / math.log(UNIT)
-    powers = np.where(moving, np.round(logarithms - np.median(logarithms[moving])), 0.0).astype(int)
-    matrix = tuple(((r, c), e * sp.Integer(UNIT) ** int(powers[c] - powers[r])) for (r, c), e in variation.matrix)
-    return Variation(variation.orbit, variation.size, matrix)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import sympy as sp
@@ -22,7 +22,6 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
 from .averages import ROUNDING
-from .variational_integrator import VariationalIntegrator
 
 SHARE = 8
 """A path takes at least SHARE steps from one end of the extent of a component to the other (a choice)."""
@@ -76,6 +75,17 @@ REACH = 0.4
 """Largest distance of a further start in the first component, relative to the extent of the motion (a choice)."""
 
 
+class OrbitIntegrator(Protocol):
+    """An integrator of one orbit."""
+
+    state: np.ndarray  # (1, states)
+    control: np.ndarray  # tolerances, in the columns of `Control`
+    steps: int  # steps so far
+
+    def advance(self, length: float) -> object:
+        """Integrate over a length of time."""
+
+
 class RateFunctions(NamedTuple):
     """Functions of a state (p,) at time 0: the rates (p,), and the sum of the absolute values of each rate's terms.
 
@@ -110,17 +120,30 @@ class Turns(NamedTuple):
 
 
 def rates_of(equations: Equations, parameters: dict[str, float]) -> RateFunctions:
-    """Return the rates of equations as functions of the state alone."""
+    """Return the rates of equations as functions of the state alone; with a mass matrix M, of M^-1 times the forces."""
     names = [sp.Symbol(name, real=True) for name in (*equations.state, *equations.parameters)]
     values = [parameters[name] for name in equations.parameters]
-    rhs = equations.rhs()
-    rates, sizes = (
-        sp.lambdify(names, [e.xreplace({TIME: sp.S.Zero}) for e in both], "numpy") for both in (rhs, map(_size, rhs))
+    rhs, mass = equations.rhs(), equations.mass()
+    places = tuple(np.array([*mass], dtype=int).reshape(-1, 2).T)
+    rates, sizes, masses = (
+        sp.lambdify(names, [e.xreplace({TIME: sp.S.Zero}) for e in part], "numpy")
+        for part in (rhs, map(_size, rhs), mass.values())
     )
-    return RateFunctions(
-        lambda state: np.array(rates(*state, *values), dtype=float),
-        lambda state: np.array(sizes(*state, *values), dtype=float),
-    )
+
+    def inverse(state: np.ndarray) -> np.ndarray:
+        matrix = np.zeros((len(state), len(state)))
+        matrix[places] = masses(*state, *values)
+        return np.linalg.inv(matrix)
+
+    def solved(state: np.ndarray) -> np.ndarray:
+        forces = np.array(rates(*state, *values), dtype=float)
+        return inverse(state) @ forces if mass else forces
+
+    def solved_sizes(state: np.ndarray) -> np.ndarray:
+        forces = np.array(sizes(*state, *values), dtype=float)
+        return np.abs(inverse(state)) @ forces if mass else forces
+
+    return RateFunctions(solved, solved_sizes)
 
 
 def _size(e: sp.Expr) -> sp.Expr:
@@ -175,7 +198,7 @@ def rests(rates: RateFunctions, state: np.ndarray, closed: float, extent: np.nda
 
 
 def path(
-    integrator: VariationalIntegrator, rates: RateFunctions, shortest: float, hidden: int = 0
+    integrator: OrbitIntegrator, rates: RateFunctions, shortest: float, hidden: int = 0
 ) -> Iterator[tuple[np.ndarray, float, np.ndarray, np.ndarray]]:
     """Advance one orbit by steps in which components move by a small part of their extents and the motion hardly turns.
 
@@ -224,7 +247,7 @@ def shortest_time(rates: RateFunctions, state: np.ndarray) -> float:
     return FIRST * float(min(times, default=1.0 / FIRST))
 
 
-def turns_of(integrator: VariationalIntegrator, rates: RateFunctions, hidden: int = 0) -> Turns:
+def turns_of(integrator: OrbitIntegrator, rates: RateFunctions, hidden: int = 0) -> Turns:
     """Measure the mean return time of an undriven orbit, or the slowest rate of the equilibrium that the orbit reaches.
 
     A motion with constant rates, such as that of locked phases, counts as an equilibrium that drifts. A turn of a

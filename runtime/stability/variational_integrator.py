@@ -205,6 +205,11 @@ class VariationalIntegrator:
         if spare:
             self.vectors[:, :, -spare:] = self.vectors[:, :, -spare - 1 : -spare]
 
+    def set_directions(self, basis: np.ndarray) -> None:
+        """Set the deviations (size, count) of one orbit, and those in spare lanes to zero."""
+        self.vectors[:] = 0.0
+        self.vectors[0, :, : basis.shape[1]] = basis
+
     def advance(self, length: float | np.ndarray) -> np.ndarray:
         """Integrate over a length of time; return the logarithm of the growth of each deviation.
 

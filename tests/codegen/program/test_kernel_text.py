@@ -45,6 +45,7 @@ DRIVERS = {
     "contacts": Driver(KernelKind.SWEEP, 8, contacts=True),
     "looped": Driver(KernelKind.SWEEP, 8, looped=True),
     "series": Driver(KernelKind.SWEEP, 8, series=True),
+    "frame": Driver(KernelKind.FRAME, 8, looped=True, series=True),
     "modes": Driver(KernelKind.MODES, 8, contacts=True),
     "modes_series": Driver(KernelKind.MODES, 8, contacts=True, series=True),
 } | {name: Recorder(name, 8, False) for name in RECORDERS}

@@ -1,0 +1,123 @@
+"""Lyapunov spectra by lifted networks: above eight oscillators, with mass matrices, of several kinds of oscillators."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+from pendula import ByHand, pendulum
+
+import synchain as sc
+from synchain.runtime.stability.lifted_integrator import LiftedIntegrator
+from synchain.runtime.stability.tangent_frame import TangentFrame
+
+B, KAPPA = sp.symbols("b kap")
+
+
+def stuart_landau(n: int) -> sc.Scene:
+    """A ring of Stuart-Landau oscillators in phase."""
+    node = sc.Field({"x": "x - y - (x**2 + y**2)*(x - y/2)", "y": "y + x - (x**2 + y**2)*(y + x/2)"})
+    i, j, W = sc.ends(node)
+    turned = {i.x: KAPPA * W * (j.x - i.x - B * (j.y - i.y)), i.y: KAPPA * W * (j.y - i.y + B * (j.x - i.x))}
+    return sc.Scene(node, sc.Rates(turned, {"kap": 0.3, "b": -1.0}), sc.ring(n), initial={"x": 1.0, "y": 0.0})
+
+
+def of_modes(n: int) -> np.ndarray:
+    """Exponents of the synchronous motion: real parts of eigenvalues of 2 x 2 blocks in the turning frame."""
+    strengths = 0.3 * (2.0 - 2.0 * np.cos(2.0 * np.pi * np.arange(n) / n))
+    blocks = [np.array([[-2.0 - k, -k], [-1.0 + k, -k]]) for k in strengths]
+    return np.sort(np.concatenate([np.linalg.eigvals(block).real for block in blocks]))[::-1]
+
+
+@pytest.fixture(scope="module")
+def ring() -> sc.Lyapunov:
+    return sc.lyapunov_spectrum(stuart_landau(16), transient=20, periods=30, rtol=1e-8)
+
+
+def test_the_ring_of_sixteen_has_the_exponents_of_its_modes(ring: sc.Lyapunov) -> None:
+    """The second one by 30 digits: -0.0241115514; the sum is the divergence, 16 (2 - 4 - 1.2)."""
+    exact = of_modes(16)
+    assert exact[1] == pytest.approx(-0.0241115514, abs=1e-10)
+    assert ring.resolved.all()
+    np.testing.assert_allclose(ring.exponent[:16], exact[:16], atol=1e-7)
+    np.testing.assert_allclose(ring.exponent, exact, atol=0.05)  # close exponents separate slowly
+    assert ring.exponent.sum() == pytest.approx(-51.2, abs=1e-7)
+    assert ring.divergence == pytest.approx(-51.2, abs=1e-7)
+
+
+def test_the_largest_exponents_alone(ring: sc.Lyapunov) -> None:
+    few = sc.lyapunov_spectrum(stuart_landau(16), count=3, transient=40, periods=30, rtol=1e-8)
+    np.testing.assert_allclose(few.exponent, ring.exponent[:3], atol=1e-6)
+    assert np.isnan(few.divergence)
+    assert np.isnan(few.divergence_error)
+
+
+@pytest.mark.parametrize(
+    "scene", [sc.Scene("lorenz", "x->x", sc.chain(2)), sc.Scene("duffing", None)], ids=["lorenz", "duffing"]
+)
+@pytest.mark.parametrize("parts", [1, 8])
+def test_both_kernels_agree(scene: sc.Scene, parts: int) -> None:
+    """The growth of random directions over some blocks: of the lifted network, and of the kernel of modes."""
+    scene, found = scene.replace(rtol=1e-10, atol=1e-11), []
+    basis = np.linalg.qr(np.random.default_rng(3).normal(size=(len(scene.y0), 2)))[0]
+    for make in (TangentFrame._of_modes, TangentFrame._of_lift):
+        frame = make(scene, scene.equations, basis)
+        frame.turns, frame.parts = frame.turns._replace(time=1.7), parts
+        if isinstance(frame.integrator, LiftedIntegrator):
+            frame.integrator.units[:] = 1.0
+        found.append(frame.advance(np.full(3, parts))[0][:, :2])
+    np.testing.assert_allclose(*found, atol=1e-6)
+
+
+@pytest.mark.long
+def test_a_pendulum_at_rest_has_the_eigenvalues_of_its_mass_matrix() -> None:
+    """The matrix of the rates by central differences of equations written by hand."""
+    hand = ByHand(4, 1.0, 0.3)
+    steps = 1e-5 * np.eye(8)
+    matrix = np.array([hand.rates(0.0, h) - hand.rates(0.0, -h) for h in steps]).T / 2e-5
+    scene = sc.Scene(pendulum(4), None, initial={"q1": 0.01}, parameters={"delta": 0.3})
+    result = sc.lyapunov_spectrum(scene, transient=60, periods=60)
+    np.testing.assert_allclose(result.exponent, np.sort(np.linalg.eigvals(matrix).real)[::-1], atol=2e-3)
+    assert result.exponent.sum() == pytest.approx(np.trace(matrix), abs=1e-5)
+
+
+@pytest.mark.long
+def test_exponents_of_a_conservative_pendulum_come_in_pairs() -> None:
+    """Two pendula of four links, whose masses depend on the angles: 16 exponents in pairs, and chaos."""
+    scene = sc.Scene(
+        pendulum(4), "spring on q1", sc.chain(2), initial={"q1": [1.0, 0.5], "q4": [2.0, -1.0]},
+        parameters={"delta": 0.0, "sigma": 0.5},
+    )  # fmt: skip
+    result = sc.lyapunov_spectrum(scene, transient=10, periods=100, rtol=1e-8)
+    assert result.exponent[0] > 0.1
+    np.testing.assert_allclose(result.exponent + result.exponent[::-1], 0.0, atol=0.02)
+
+
+@pytest.mark.long
+def test_two_kinds_of_oscillators_in_two_layers() -> None:
+    """Linear equations: the exponents are the real parts of the eigenvalues."""
+    fast = {"oscillator": sc.Field({"x": "-3*x"}, initial={"x": 1.0}), "at": [1]}
+    slow = {"oscillator": sc.Field({"x": "w", "w": "-x - w/5"}, initial={"x": 1.0}), "at": [2, 3]}
+    scene = sc.Scene(nodes=[fast, slow], coupling="x->x", topology=sc.chain(3), parameters={"sigma": 0.5})
+    result = sc.lyapunov_spectrum(scene, transient=40, periods=60)
+    matrix = np.array(
+        [
+            [-3.5, 0.5, 0.0, 0.0, 0.0],
+            [0.5, -1.0, 0.5, 1.0, 0.0],
+            [0.0, 0.5, -0.5, 0.0, 1.0],
+            [0.0, -1.0, 0.0, -0.2, 0.0],
+            [0.0, 0.0, -1.0, 0.0, -0.2],
+        ]
+    )
+    np.testing.assert_allclose(result.exponent, np.sort(np.linalg.eigvals(matrix).real)[::-1], atol=2e-3)
+    assert result.exponent.sum() == pytest.approx(np.trace(matrix), abs=1e-6)
+
+
+def test_what_is_refused() -> None:
+    with pytest.raises(ValueError, match="found set-valued friction; expected smooth rates; use contact 'atan'"):
+        sc.lyapunov_spectrum(sc.Scene(topology=sc.chain(9), contact="set-valued"))
+    with pytest.raises(ValueError, match="count = 33; expected 1 … 32"):
+        sc.lyapunov_spectrum(stuart_landau(16), count=33)
+    node = sc.Field({"x": "v", "v": "-x**3 + v/2"}, initial={"x": 1.0})
+    with pytest.raises(FloatingPointError, match="the state grew without bound"):
+        sc.lyapunov_spectrum(sc.Scene(node, "x->v", sc.ring(9)), count=2)
