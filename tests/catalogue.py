@@ -9,7 +9,8 @@ import numpy as np
 import sympy as sp
 from parts import is_lagrangian
 
-from synchain.models import Field, Parameter, Rates, Scene, Topology, chain, from_edges, from_matrix
+from synchain import Field, Parameter, Rates, Scene
+from synchain.graphs import Topology, chain, from_edges, from_matrix
 from synchain.models.definitions.definition import COUPLING, OSCILLATOR
 from synchain.models.graphs.families import family
 from synchain.models.graphs.families import names as families

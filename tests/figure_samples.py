@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from synchain.models import Scene
-from synchain.runtime import MSF, Exponents, Plane, Result, Status
+from synchain import Scene
+from synchain.results import MSF, Exponents, Plane, Result, Status
 from synchain.runtime.paper import exponent_figure, figure_runs, load, make, plane_figure, synchronisability_map
 from synchain.runtime.plots import style
 from synchain.runtime.results.labels import States

@@ -6,13 +6,15 @@ from fractions import Fraction
 
 import sympy as sp
 
-from synchain.models import FrictionLaw, Oscillator, Parameter, Topology
+from synchain import Parameter
+from synchain.graphs import Topology
 from synchain.models.dynamics import network
 from synchain.models.interactions import link
 from synchain.models.interactions.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling
 from synchain.models.mechanics.components import Edge, Node
 from synchain.models.mechanics.oscillator import LagrangianModel
 from synchain.models.networks.layers import as_coupling, as_law, as_oscillator
+from synchain.plugins import FrictionLaw, Oscillator
 
 __all__ = ["connectivity", "coupling_of", "edge", "is_lagrangian", "law_of", "node", "oscillator_of", "parameters"]
 

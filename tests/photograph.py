@@ -35,8 +35,9 @@ import numpy as np
 import sympy as sp
 from scipy.io import netcdf_file
 
-from synchain import models
-from synchain.models import Scene, chain, complete, ring, star
+import synchain
+from synchain import Scene, graphs
+from synchain.graphs import chain, complete, ring, star
 from synchain.models.graphs.readers import from_edges
 from synchain.models.graphs.symbolic import from_symbols
 from synchain.models.graphs.topology import from_matrix
@@ -62,7 +63,7 @@ from synchain.models.graphs.closed_forms import formulas
 from synchain.models.symmetries.clusters import clusters  # isort: skip
 from synchain.models.symmetries.clusters import orbital_partitions
 
-from synchain.models.scenes.energy import energy  # isort: skip
+from synchain.models.scenes.energy import energy_terms  # isort: skip
 from synchain.codegen.export.c import to_c  # isort: skip
 from synchain.codegen.export.numba import to_numba
 from synchain.codegen.export.python import to_python
@@ -409,7 +410,9 @@ def _() -> Quantities:
 def _() -> Quantities:
     given = SHORT | {"integrator": "dop853", "time_unit": "time"}
     own = {"delta": [0.1, 0.2, 0.3, 0.4], "omega": [1, 1.5, 2, 2.5]}
-    return simulated(Scene(oscillator="duffing", topology=models.grid(4), parameters=own, **given), sigma=[0.1, 0.5])
+    return simulated(
+        Scene(oscillator="duffing", topology=synchain.graphs.grid(4), parameters=own, **given), sigma=[0.1, 0.5]
+    )
 
 
 @scene("Duffing with inerters on a one-way graph, cash_karp")
@@ -466,28 +469,28 @@ def _() -> Quantities:
 @scene("van der Pol with dampers, looped small world, dop853", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "dop853", "time_unit": "time"}
-    graph = models.small_world(12)
+    graph = synchain.graphs.small_world(12)
     return simulated(Scene(oscillator="van_der_pol", coupling="damper", topology=graph, **given), sigma=[0.1, 0.5])
 
 
 @scene("Rössler in a feed-forward chain, rodas6p", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "rodas6p", "initial": {"x": [1.0, 1.1, 1.2], "y": 0, "z": 0}}
-    network = {"oscillator": "rossler", "coupling": "y->y", "topology": models.feed_forward(3)}
+    network = {"oscillator": "rossler", "coupling": "y->y", "topology": synchain.graphs.feed_forward(3)}
     return simulated(Scene(**network, **given), sigma=[0.1, 0.5])
 
 
 @scene("Lorenz on a bipartite graph, dop853", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "dop853", "transient": 0.2, "window": 1.0}
-    graph = models.complete_bipartite(3)
+    graph = synchain.graphs.complete_bipartite(3)
     return simulated(Scene(oscillator="lorenz", coupling="x->x", topology=graph, **given), sigma=[1.0, 3.0])
 
 
 @scene("Chua in a one-way ring, rodas4", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "rodas4"}
-    graph = models.one_way_ring(3)
+    graph = synchain.graphs.one_way_ring(3)
     return simulated(Scene(oscillator="chua", coupling="x->x", topology=graph, **given), sigma=[1.0, 3.0])
 
 
@@ -514,14 +517,14 @@ def _() -> Quantities:
 @scene("pendulums with friction dampers on a tree, cash_karp", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "cash_karp", "parameters": {"delta": 0.1, "torque": 0.2}}
-    network = {"oscillator": "pendulum", "coupling": "friction_damper", "topology": models.tree(3)}
+    network = {"oscillator": "pendulum", "coupling": "friction_damper", "topology": synchain.graphs.tree(3)}
     return simulated(Scene(**network, **given), sigma=[0.1, 0.3])
 
 
 @scene("rotors with torsion on a wheel, cash_karp", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "cash_karp", "parameters": {"power": [1.0, -1.0, 0.5, -0.5]}}
-    network = {"oscillator": "rotor", "coupling": "torsion", "topology": models.wheel(4)}
+    network = {"oscillator": "rotor", "coupling": "torsion", "topology": synchain.graphs.wheel(4)}
     return simulated(Scene(**network, **given), sigma=[0.5, 1.0])
 
 
@@ -535,13 +538,13 @@ def _() -> Quantities:
 @scene("harmonic hypercube with cubic springs, rodas6p", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "rodas6p", "record": ("trajectory",), "samples": 5}
-    network = Scene(oscillator="harmonic", coupling="cubic_spring", topology=models.hypercube(4), **given)
+    network = Scene(oscillator="harmonic", coupling="cubic_spring", topology=synchain.graphs.hypercube(4), **given)
     return simulated(network, sigma=[0.1, 0.5]) | balance(network.replace(sigma=0.1))
 
 
 def balance(given: Scene) -> Quantities:
     """The energy of a network: its formulas, and numbers at a state made of multiples of 1/8."""
-    found, power = energy(given).whole()
+    found, power = energy_terms(given).whole()
     states = np.arange(1, len(given.y0) + 1)[None] * np.array([[0.125], [-0.25]])
     function = energy_function(given)
     return {
@@ -756,7 +759,7 @@ FAMILIES: dict[str, dict[str, Any]] = {
 def _() -> Quantities:
     seen: Quantities = {}
     for name in names(TOPOLOGY):
-        make = getattr(models, name)
+        make = getattr(graphs, name)
         seen |= {f"{name} {n}": exact(make(n)) for n in (family_sizes.size(name, n) for n in (5, 8, 12))}
         if name in FAMILIES:
             size = math.prod(FAMILIES[name].get("shape", (10,)))
@@ -771,7 +774,7 @@ def _() -> Quantities:
 
 @scene("spectra of large graphs")
 def _() -> Quantities:
-    return {"chain": exact(chain(300)), "ring": exact(ring(1001)), "cube": exact(models.hypercube(512))}
+    return {"chain": exact(chain(300)), "ring": exact(ring(1001)), "cube": exact(synchain.graphs.hypercube(512))}
 
 
 @scene("spectra of matrices")
@@ -792,11 +795,11 @@ def _() -> Quantities:
 def _() -> Quantities:
     one_way = from_edges([(0, 1), (1, 2, 0.5), (2, 0), (2, 3)], directed=True)
     return {
-        "cartesian": exact(models.cartesian(ring(5), star(4))),
-        "kronecker": exact(models.kronecker(chain(3), complete(4))),
-        "union": exact(models.union(ring(3), chain(4))),
-        "complement": exact(models.complement(ring(7))),
-        "weighted": exact(models.weighted(chain(4), "1/3")),
+        "cartesian": exact(synchain.graphs.cartesian(ring(5), star(4))),
+        "kronecker": exact(synchain.graphs.kronecker(chain(3), complete(4))),
+        "union": exact(synchain.graphs.union(ring(3), chain(4))),
+        "complement": exact(synchain.graphs.complement(ring(7))),
+        "weighted": exact(synchain.graphs.weighted(chain(4), "1/3")),
         "edges": exact(one_way),
     }
 
@@ -816,9 +819,9 @@ def _() -> Quantities:
 @scene("cluster states of small graphs")
 def _() -> Quantities:
     seen: Quantities = {}
-    for name, graph in (("star", star(5)), ("ring", ring(6)), ("ladder", models.ladder(6))):
+    for name, graph in (("star", star(5)), ("ring", ring(6)), ("ladder", synchain.graphs.ladder(6))):
         seen[name] = "\n".join(f"{c.classes} {c.quotients[0].links} {c.blocks}" for c in orbital_partitions(graph))
-    seen["bipartite"] = str(clusters(models.complete_bipartite(5), [0, 0, 1, 1, 1]).blocks)
+    seen["bipartite"] = str(clusters(synchain.graphs.complete_bipartite(5), [0, 0, 1, 1, 1]).blocks)
     return seen
 
 
@@ -852,7 +855,7 @@ def _() -> Quantities:
         beam = [{"oscillator": "beam", "at": [1]}] if graph.name == "star" else None
         own = "clock" if beam else "duffing"
         given = Scene(oscillator=own, nodes=beam, coupling=name, topology=graph)
-        found, power = energy(given).whole()
+        found, power = energy_terms(given).whole()
         seen |= {f"{name} {key}": value for key, value in written(given).items()}
         seen |= {f"{name} energy": sp.sstr(found), f"{name} power": sp.sstr(power)}
     return seen
@@ -863,7 +866,7 @@ def _() -> Quantities:
     seen: Quantities = {}
     for name in names(TOPOLOGY):
         for n in (family_sizes.size(name, n) for n in (6, 12)):
-            given = Scene(oscillator="harmonic", topology=getattr(models, name)(n))
+            given = Scene(oscillator="harmonic", topology=getattr(graphs, name)(n))
             seen |= {f"{name} {n} {key}": value for key, value in written(given).items()}
     return seen
 
@@ -871,7 +874,7 @@ def _() -> Quantities:
 @scene("equations of the shipped scenes")
 def _() -> Quantities:
     seen: Quantities = {}
-    for name in models.scene_names():
+    for name in synchain.scene_names():
         seen |= {f"{name} {key}": value for key, value in written(load_scene(name)).items()}
     return seen
 

@@ -15,13 +15,13 @@ import numpy as np
 import sympy as sp
 from pendula import pendulum, telescope
 
-from synchain import one_way_ring
+from synchain import Potential, Rates, Scene, ends
 from synchain.codegen import driver
 from synchain.codegen.driver.columns import COUNTS
 from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import SweepKernel, emit
 from synchain.codegen.machine_code.compile import Kernel, load
-from synchain.models import Potential, Rates, Scene, chain, ends, from_matrix, ring, star
+from synchain.graphs import chain, from_matrix, one_way_ring, ring, star
 from synchain.models.definitions.loader import load_oscillator
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Edge, Node

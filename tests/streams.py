@@ -12,7 +12,7 @@ import time
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from synchain.models import chain
+from synchain.graphs import chain
 from synchain.models.scenes.scene import Scene
 from synchain.models.sweeps.axis import Axis
 from synchain.runtime.cells.reduce import reduce_scene

@@ -13,6 +13,8 @@ from typing import Any
 import pytest
 from mutants import TESTS
 
+import synchain
+from synchain.models.graphs.families import TOPOLOGY, names
 from synchain.runtime.cli import parser
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -122,11 +124,14 @@ def test_the_table_of_problems_holds_all_examples() -> None:
     assert sorted(rows) == sorted((MEASURE["title"](path), path.stem, str(MEASURE["lines"](path))) for path in EXAMPLES)
 
 
-@pytest.mark.parametrize("package", ["synchain.models", "synchain.runtime"])
-def test_the_reference_holds_all_public_names(package: str) -> None:
+@pytest.mark.parametrize("name", ["", *synchain.MODULES])
+def test_the_reference_holds_all_public_names(name: str) -> None:
     pages = "\n".join(path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs" / "reference").glob("*.rst")))
-    entries = set(re.findall(r"^\.\. auto(?:class|function|exception|data):: (\w+)", pages, re.MULTILINE))
-    assert not set(importlib.import_module(package).__all__) - entries
+    entries = set(re.findall(r"^\.\. auto(?:class|function|exception|data):: ([\w.]+)", pages, re.MULTILINE))
+    module = getattr(synchain, name) if name else synchain
+    families = names() if name == "graphs" else ()
+    offered = {*module.__all__} - {*synchain.MODULES, *families, *TOPOLOGY.also}
+    assert not {f"{module.__name__}.{each}" for each in offered} - entries
 
 
 def test_mutants_name_modules_and_tests() -> None:

@@ -12,11 +12,12 @@ import sys
 import zipfile
 from collections.abc import Iterable
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 import synchain
-from synchain import models, runtime
+from synchain import graphs
 from synchain.models.graphs import families
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -43,7 +44,7 @@ TYPES = {"tuple[int, ...]": "Iterable[int]", "str": "float | str"}
 
 
 def files() -> list[str]:
-    folder = Path(models.__file__).parent / "topologies"
+    folder = ROOT / "models" / "topologies"
     return sorted(path.stem for path in folder.glob("*.py") if path.stem != "__init__")
 
 
@@ -106,51 +107,61 @@ def topology_stub() -> str:
     return "".join([*overloads, "@overload\ndef topology(name: str, n: int, **options: object) -> Topology: ...\n"])
 
 
-def models_stub() -> str:
-    homes = sorted((home, name) for name, home in models._HOMES.items() if name != "topology")
-    lines = [f"from .{home} import {name} as {name}" for home, name in homes]
-    stubs = topology_stub() + "\n".join(map(function_stub, shipped()))
-    head = "# What `__init__.py` loads on first use; tests/test_front.py writes it with --update.\n"
+def stub(module: ModuleType) -> str:
+    """The names of a module with where they are defined, as editors read them."""
+    homes = sorted((home, name) for name, home in module.HOMES.items() if home and name != "topology")
+    lines = [f"from synchain.{home} import {name} as {name}" for home, name in homes]
+    head = "# What the module loads on first use; tests/test_front.py writes this file with --update.\n"
+    if module is synchain:
+        parts = "".join(f"from . import {name} as {name}\n" for name in synchain.MODULES)
+        return f"{head}{parts}" + "\n".join(lines) + "\n\n__version__: str\n"
+    if module is not graphs:
+        return head + "\n".join(lines) + "\n"
     needed = "from collections.abc import Iterable\nfrom typing import Literal, overload\n\n"
+    stubs = topology_stub() + "\n".join(map(function_stub, shipped()))
     return f"{head}{needed}" + "\n".join(lines) + "\n\n" + stubs
 
 
-def front_stub() -> str:
-    lines = [f"from synchain.models import {name} as {name}" for name in sorted({*models.__all__, *shipped()})]
-    lines += [f"from synchain.runtime import {name} as {name}" for name in sorted(runtime.__all__)]
-    head = "# What `__init__.py` loads on first use; tests/test_front.py writes it with --update.\n"
-    return (
-        head
-        + "\n".join(["from synchain import models as models, runtime as runtime", *lines])
-        + "\n\n__version__: str\n"
-    )
+@pytest.mark.parametrize("name", ["__init__", *synchain.MODULES])
+def test_the_stubs_name_what_the_modules_offer(name: str, request: pytest.FixtureRequest) -> None:
+    text = stub(synchain if name == "__init__" else getattr(synchain, name))
+    path = ROOT / "runtime" / "front" / f"{name}.pyi"
+    if request.config.getoption("--update"):
+        path.write_text(text, encoding="utf-8")
+    assert path.read_text("utf-8") == text, f"{path} is old; run: pytest tests/test_front.py --update"
+
+
+def test_every_public_name_is_offered_once_and_loads() -> None:
+    modules = [synchain, *(getattr(synchain, name) for name in synchain.MODULES)]
+    names = [name for module in modules for name in module.__all__]
+    assert len(names) == len({*names})
+    assert {*CONTRACT} <= {*synchain.__all__}
+    assert {*shipped()} <= {*graphs.__all__}
+    for module in modules:
+        assert {*module.__all__} <= {*dir(module)}
+        for name in module.__all__:
+            value = getattr(module, name)
+            assert getattr(value, "__name__", name).rpartition(".")[2] == name  # `nodes` and families have none
+    assert synchain.__version__ == importlib.import_module("importlib.metadata").version("synchain")
 
 
 @pytest.mark.parametrize(
-    ("path", "make"), [("models/__init__.pyi", models_stub), ("runtime/front/__init__.pyi", front_stub)]
+    ("module", "name", "message"),
+    [
+        ("synchain", "chian", "module 'synchain' has no attribute 'chian'$"),
+        ("synchain", "ring", "no attribute 'ring'; use synchain.graphs.ring$"),
+        ("synchain.graphs", "mean", "no attribute 'mean'; use synchain.observe.mean$"),
+        ("synchain.results", "run", "no attribute 'run'; use synchain.run$"),
+    ],
 )
-def test_the_stubs_say_what_the_packages_offer(path: str, make: object, request: pytest.FixtureRequest) -> None:
-    text = make()  # type: ignore[operator]
-    if request.config.getoption("--update"):
-        (ROOT / path).write_text(text, encoding="utf-8")
-    assert (ROOT / path).read_text("utf-8") == text, f"{path} is old; run: pytest tests/test_front.py --update"
-
-
-def test_the_front_offers_every_name_of_both_packages_once() -> None:
-    assert not {*dir(models)} & {*runtime.__all__} - {"__doc__"}
-    for name in (*models.__all__, *runtime.__all__, *shipped()):
-        home = runtime if name in runtime.__all__ else models
-        assert getattr(synchain, name) is getattr(home, name) or getattr(synchain, name) == getattr(home, name)
-    offered = set(dir(synchain))
-    assert {*CONTRACT, *shipped(), "__version__", "models", "runtime"} <= offered
-    assert synchain.__version__ == importlib.import_module("importlib.metadata").version("synchain")
-    with pytest.raises(AttributeError, match="module 'synchain' has no attribute 'chian'"):
-        _ = synchain.chian
+def test_a_name_of_another_module_is_said(module: str, name: str, message: str) -> None:
+    with pytest.raises(AttributeError, match=message):
+        getattr(importlib.import_module(module), name)
 
 
 EDITED = """
-from synchain import circulant, gnp_random, msf, path, run, topology
-from synchain.models import Scene, chain
+from synchain import Scene, msf, run
+from synchain.graphs import chain, circulant, gnp_random, path, topology
 
 path(4)
 gnp_random(6, p="1/3", seed=2)
@@ -174,8 +185,8 @@ def test_a_type_checker_sees_what_an_editor_completes(tmp_path: Path) -> None:
     folder_on_path.mkdir(parents=True)
     for room in ("models", "codegen", "runtime"):
         (folder_on_path / room).symlink_to(ROOT / room)
-    for part in ("__init__.py", "__init__.pyi"):
-        (folder_on_path / part).symlink_to(ROOT / "runtime" / "front" / part)
+    for part in (ROOT / "runtime" / "front").iterdir():
+        (folder_on_path / part.name).symlink_to(part)
     command = [
         sys.executable,
         "-m",
@@ -195,11 +206,9 @@ def test_a_type_checker_sees_what_an_editor_completes(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", shipped())
 def test_a_family_tells_its_options(name: str) -> None:
-    signature = inspect.signature(getattr(synchain, name))
-    assert list(signature.parameters) == ["n", *getattr(synchain, name).options]
-    assert {p.name: p.default for p in signature.parameters.values() if p.name != "n"} == getattr(
-        synchain, name
-    ).options
+    signature = inspect.signature(getattr(graphs, name))
+    assert list(signature.parameters) == ["n", *getattr(graphs, name).options]
+    assert {p.name: p.default for p in signature.parameters.values() if p.name != "n"} == getattr(graphs, name).options
 
 
 def test_the_class_of_families_has_the_signature_of_its_constructor() -> None:
@@ -216,10 +225,10 @@ def test_import_synchain_is_light() -> None:
 def test_star_imports_go_together_and_bring_the_contract() -> None:
     """In one process, which costs as much as all modules together."""
     code = f"""
-from synchain.models import *; from synchain.runtime import *; from synchain.runtime import msf, basin; print(msf, basin)
+from synchain import *; from synchain.graphs import *; from synchain.observe import *; print(msf, chain(3).n)
 for name in {{*globals()}}:
     if not name.startswith("__"): del globals()[name]
-from synchain import *; print(*[n for n in {CONTRACT!r} if n not in globals()]); print(chain(3).n)
+from synchain import *; print(*[n for n in {CONTRACT!r} if n not in globals()]); print(graphs.chain(3).n)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     together, *contract = done.stdout.splitlines()
@@ -278,10 +287,10 @@ def test_wheel_and_source_archive_hold_the_front(tmp_path: Path) -> None:
     subprocess.run([*pip, str(source)], check=True, timeout=300)
     (wheel,) = tmp_path.glob("*.whl")
     names = set(zipfile.ZipFile(wheel).namelist())
-    front = {"synchain/__init__.py", "synchain/__init__.pyi", "synchain/py.typed", "synchain/models/__init__.pyi"}
+    front = {f"synchain/{path.name}" for path in (ROOT / "runtime" / "front").iterdir() if path.is_file()}
     assert front <= names
     assert not [name for name in names if "front/" in name]
-    code = "import synchain; print(synchain.__file__); print(synchain.star(6).spectrum)"
+    code = "import synchain; print(synchain.__file__); print(synchain.graphs.star(6).spectrum)"
     path = tmp_path / "site"
     zipfile.ZipFile(wheel).extractall(path)
     run = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(path)!r}); {code}"]

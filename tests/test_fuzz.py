@@ -15,9 +15,10 @@ from hypothesis import HealthCheck, given, note, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from synchain import Scene, run
 from synchain.codegen.export.python import to_python
-from synchain.models import Scene, topology
-from synchain.runtime import Status, run
+from synchain.graphs import topology
+from synchain.results import Status
 
 EXAMPLES = 12
 """Scenes of each structure where no time is given."""

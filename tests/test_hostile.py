@@ -31,7 +31,7 @@ from synchain.runtime.cli import main
 
 def law(folder: Path, body: str, name: str = "law.py") -> str:
     """The path of a file of one's own, allowed to run."""
-    head = "from synchain.models import Lagrangian, Parameter, friction_law, link_energy\n"
+    head = "from synchain import Lagrangian, Parameter, friction_law, link_energy\n"
     path = folder / name
     path.write_text(head + textwrap.dedent(body))
     plugins.allow_code(path)

@@ -15,9 +15,6 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from family_sizes import size
-
-import synchain.models
 
 PROJECT = Path(__file__).resolve().parents[1]
 PACKAGES = ("models", "codegen", "runtime")
@@ -266,30 +263,17 @@ def loaded_by(statement: str) -> set[str]:
     ("statement", "absent"),
     [
         ("import synchain", {"sympy", "flint", "numpy", "numba", "matplotlib"}),
-        ("from synchain.models import chain; chain(4)", {"sympy", "flint", "numpy", "numba", "matplotlib"}),
+        ("from synchain.graphs import chain; chain(4)", {"sympy", "flint", "numpy", "numba", "matplotlib"}),
         (
-            "from synchain.models import chain, from_matrix, star; import synchain.models.spectra.solve;"
+            "from synchain.graphs import chain, from_matrix, star; import synchain.models.spectra.solve;"
             "[str(graph.spectrum) for graph in (star(6), chain(7), from_matrix([[-1, 1], [1, -1]]))]",
             {"numpy", "numba", "matplotlib", "scipy"},
         ),
         (
-            "from synchain.models import load_scene; load_scene('figure_4a').equations",
+            "from synchain import load_scene; load_scene('figure_4a').equations",
             {"numpy", "numba", "matplotlib", "scipy"},
         ),
     ],
 )
 def test_start_loads_only_what_it_needs(statement: str, absent: set[str]) -> None:
     assert loaded_by(statement) & absent == set()
-
-
-def test_the_package_offers_its_names_on_first_use() -> None:
-    for name in synchain.models.__all__:
-        value = getattr(synchain.models, name)
-        assert getattr(value, "__name__", name) == name  # `nodes` is a value
-    families = {path.stem for path in (PROJECT / "models" / "topologies").glob("*.py")} - {"__init__"}
-    assert families
-    assert families | set(synchain.models.__all__) <= set(dir(synchain.models))
-    for name in families:
-        assert getattr(synchain.models, name)(size(name, 6)).name == name
-    with pytest.raises(AttributeError, match="no attribute 'chian'"):
-        _ = synchain.models.chian

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from catalogue import PAIR
 
-from synchain import runtime
-from synchain.models import Field, Rates, Scene, chain
+import synchain
+from synchain import Criterion, Field, Rates, Scene
+from synchain.graphs import chain
 from synchain.models.scenes.scene import KEYWORDS
-from synchain.runtime import Criterion, Progress, Status
+from synchain.results import Progress, Status
 from synchain.runtime.bifurcation import skeleton as skeletons
 from synchain.runtime.cells.run_keywords import Given
 from synchain.runtime.synchronisation.agreement import agreement
@@ -66,7 +67,7 @@ DRIVEN = Scene(oscillator="duffing", topology=chain(2), parameters={"omega": 1.3
 
 @pytest.mark.parametrize("name", sorted(TAKEN))
 def test_the_shared_keywords_have_the_same_names_and_defaults(name: str) -> None:
-    parameters = inspect.signature(getattr(runtime, name)).parameters
+    parameters = inspect.signature(getattr(synchain, name)).parameters
     assert {word for word in SHARED if word in parameters} == TAKEN[name]
     for word in TAKEN[name]:
         assert parameters[word].default == OTHER.get((name, word), SHARED[word])
@@ -76,27 +77,27 @@ def test_the_shared_keywords_have_the_same_names_and_defaults(name: str) -> None
 
 
 def test_every_function_that_computes_is_in_the_table() -> None:
-    functions = {name for name in runtime.__all__ if inspect.isfunction(getattr(runtime, name))}
-    assert functions - {"kernel", "open_result", "merge", "follow"} == set(TAKEN)
+    functions = {name for name, home in synchain.HOMES.items() if home.startswith("runtime")} - {"Criterion"}
+    assert functions - {"kernel", "open_result", "merge", "energy_function", "follow"} == set(TAKEN)
 
 
 def calls(scene: Scene, path: Any) -> dict[str, Callable[..., object]]:
     """Each function with what it cannot do without."""
     return {
-        "run": lambda **keywords: runtime.run(scene, **keywords),
-        "stream": lambda **keywords: runtime.stream(scene, path, **keywords),
-        "basin": lambda **keywords: runtime.basin(scene, **keywords),
-        "thresholds": lambda **keywords: runtime.thresholds(scene, **keywords),
-        "universal_probe": lambda **keywords: runtime.universal_probe(scene, 0.1, 0.1, **keywords),
-        "exponents": lambda **keywords: runtime.exponents(scene, [0.1], **keywords),
-        "msf": lambda **keywords: runtime.msf(scene, [0.1, 0.2], **keywords),
-        "plane": lambda **keywords: runtime.plane(scene, [0.1, 0.2], [0.0, 0.1], **keywords),
-        "transition": lambda **keywords: runtime.transition(scene, [0.0, 0.2], **keywords),
-        "cluster_exponents": lambda **keywords: runtime.cluster_exponents(scene, [0, 0], **keywords),
-        "lyapunov_spectrum": lambda **keywords: runtime.lyapunov_spectrum(scene, **keywords),
-        "equilibrium": lambda **keywords: runtime.equilibrium(scene, **keywords),
-        "periodic_orbit": lambda **keywords: runtime.periodic_orbit(scene, **keywords),
-        "skeleton": lambda **keywords: runtime.skeleton(scene, "omega", [1.3], **keywords),
+        "run": lambda **keywords: synchain.run(scene, **keywords),
+        "stream": lambda **keywords: synchain.stream(scene, path, **keywords),
+        "basin": lambda **keywords: synchain.basin(scene, **keywords),
+        "thresholds": lambda **keywords: synchain.thresholds(scene, **keywords),
+        "universal_probe": lambda **keywords: synchain.universal_probe(scene, 0.1, 0.1, **keywords),
+        "exponents": lambda **keywords: synchain.exponents(scene, [0.1], **keywords),
+        "msf": lambda **keywords: synchain.msf(scene, [0.1, 0.2], **keywords),
+        "plane": lambda **keywords: synchain.plane(scene, [0.1, 0.2], [0.0, 0.1], **keywords),
+        "transition": lambda **keywords: synchain.transition(scene, [0.0, 0.2], **keywords),
+        "cluster_exponents": lambda **keywords: synchain.cluster_exponents(scene, [0, 0], **keywords),
+        "lyapunov_spectrum": lambda **keywords: synchain.lyapunov_spectrum(scene, **keywords),
+        "equilibrium": lambda **keywords: synchain.equilibrium(scene, **keywords),
+        "periodic_orbit": lambda **keywords: synchain.periodic_orbit(scene, **keywords),
+        "skeleton": lambda **keywords: synchain.skeleton(scene, "omega", [1.3], **keywords),
     }
 
 
@@ -176,27 +177,27 @@ def test_a_parameter_fixes_an_axis() -> None:
     keywords: dict[str, Any] = {"starts": 1, "transient": 5, "periods": 5, "show_progress": False}
     swept = DRIVEN.replace(axes={"omega": [1.2, 1.4], "delta": [0.3, 0.7]})
     with pytest.raises(ValueError, match="found axes of delta;"):
-        runtime.msf(swept, [0.1, 0.2], omega=1.4)
-    result = runtime.msf(swept, [0.1, 0.2], omega=1.4, delta=0.7, **keywords)
-    expected = runtime.msf(DRIVEN, [0.1, 0.2], omega=1.4, delta=0.7, **keywords)
+        synchain.msf(swept, [0.1, 0.2], omega=1.4)
+    result = synchain.msf(swept, [0.1, 0.2], omega=1.4, delta=0.7, **keywords)
+    expected = synchain.msf(DRIVEN, [0.1, 0.2], omega=1.4, delta=0.7, **keywords)
     assert result.scene == expected.scene
     np.testing.assert_array_equal(result.exponent, expected.exponent)
 
 
 SHORT_ORBITS: dict[str, Any] = {"starts": 1, "transient": 5, "periods": 5, "show_progress": False}
 SAME = {
-    "exponents": lambda scene: runtime.exponents(scene, [0.1, 0.2], **SHORT_ORBITS).exponent,
-    "msf": lambda scene: runtime.msf(scene, [0.1, 0.2], **SHORT_ORBITS).exponent,
-    "a plane of alpha and beta": lambda scene: runtime.plane(scene, [0.1, 0.2], [0.0, 0.1], **SHORT_ORBITS).exponent,
+    "exponents": lambda scene: synchain.exponents(scene, [0.1, 0.2], **SHORT_ORBITS).exponent,
+    "msf": lambda scene: synchain.msf(scene, [0.1, 0.2], **SHORT_ORBITS).exponent,
+    "a plane of alpha and beta": lambda scene: synchain.plane(scene, [0.1, 0.2], [0.0, 0.1], **SHORT_ORBITS).exponent,
     "a plane of alpha and omega": lambda scene: (
-        runtime.plane(scene, [0.1, 0.2], omega=[1.3, 1.4], **SHORT_ORBITS).exponent
+        synchain.plane(scene, [0.1, 0.2], omega=[1.3, 1.4], **SHORT_ORBITS).exponent
     ),
     "universal_probe": lambda scene: (
-        runtime.universal_probe(scene, [0.1, 2.0], 0.0, criterion=SHORT, show_progress=False).error
+        synchain.universal_probe(scene, [0.1, 2.0], 0.0, criterion=SHORT, show_progress=False).error
     ),
     "thresholds": lambda scene: [
         edge
-        for found in [runtime.thresholds(scene, criterion=SHORT, resolution=0.1, periods=5, show_progress=False)]
+        for found in [synchain.thresholds(scene, criterion=SHORT, resolution=0.1, periods=5, show_progress=False)]
         for ranges in (found.direct.intervals, found.probe.intervals, found.exponents.intervals)
         for interval in ranges
         for edge in interval
@@ -224,12 +225,12 @@ def test_an_axis_of_the_strength_is_refused_where_something_depends_on_it(tmp_pa
         with pytest.raises(ValueError, match=f"^{name}: found axes of sigma; "):
             calls(swept, tmp_path / "a.nc")[name]()
     with pytest.raises(ValueError, match=r"^plane: found axes of sigma; "):
-        runtime.plane(swept, omega=[1.2, 1.3], delta=[0.2, 0.3])
+        synchain.plane(swept, omega=[1.2, 1.3], delta=[0.2, 0.3])
     theta = Field({"theta": "1 - theta"})
     pull = Rates({"theta": "g*W*(theta_j - 2*theta_i)"}, {"g": 0.1})
     between_equal_states = Scene(theta, pull, chain(2), axes={"g": [0.1, 0.2]})
     with pytest.raises(ValueError, match=r"^exponents: found axes of g; "):
-        runtime.exponents(between_equal_states, [0.1, 0.2])
+        synchain.exponents(between_equal_states, [0.1, 0.2])
 
 
 COLLIDING = (
@@ -257,17 +258,17 @@ def colliding() -> Scene:
 @pytest.mark.parametrize("name", COLLIDING)
 def test_parameters_with_the_names_of_keywords_go_into_the_mapping(name: str) -> None:
     scene = colliding()
-    result = runtime.exponents(scene, [0.0, 0.5], parameters={name: 3.0}, starts=1)
+    result = synchain.exponents(scene, [0.0, 0.5], parameters={name: 3.0}, starts=1)
     np.testing.assert_allclose(result.exponent, [-3.0, -3.5], rtol=1e-9)
-    end = runtime.run(scene, parameters={name: [0.5, 2.0]}, show_progress=False).end
+    end = synchain.run(scene, parameters={name: [0.5, 2.0]}, show_progress=False).end
     np.testing.assert_allclose(end.sel(component="x", node=1), np.exp([-0.5, -2.0]), rtol=1e-7)
-    assert Given(runtime.run, {name: 1.5}).sweep(scene).parameters[name] == 1.5
-    assert runtime.msf(scene, [0.0, 0.5], parameters={name: 3.0}, starts=1).scene.parameters[name] == 3.0
+    assert Given(synchain.run, {name: 1.5}).sweep(scene).parameters[name] == 1.5
+    assert synchain.msf(scene, [0.0, 0.5], parameters={name: 3.0}, starts=1).scene.parameters[name] == 3.0
 
 
 def test_certificates_take_parameters_with_the_names_of_fields() -> None:
     scene = colliding().replace(record=("sync_error",))
-    result = runtime.run(scene, parameters={"seed": [1.0, 2.0]}, sigma=0.5, certified=True, show_progress=False)
+    result = synchain.run(scene, parameters={"seed": [1.0, 2.0]}, sigma=0.5, certified=True, show_progress=False)
     np.testing.assert_allclose(result.data["transversal_exponent"], [-2.0, -3.0], rtol=1e-9)
 
 
@@ -275,19 +276,19 @@ def test_branches_follow_parameters_with_the_names_of_keywords() -> None:
     """x'' = -x - x' + a cos(t): x = a sin(t)."""
     node = Field({"x": "v", "v": "-x - v + start*cos(omega*t)"}, parameters={"start": 0.5, "omega": 1.0})
     scene = Scene(node, "x->x", transient=30.0)
-    first = runtime.periodic_orbit(scene, parameters={"start": 0.1})
-    branch = runtime.follow(first, "start", values=[0.1, 0.2])
+    first = synchain.periodic_orbit(scene, parameters={"start": 0.1})
+    branch = synchain.follow(first, "start", values=[0.1, 0.2])
     np.testing.assert_allclose([orbit.state[1] for orbit in branch.orbits], [0.1, 0.2], atol=1e-9)
 
 
 def test_mapping_and_keywords_say_the_same() -> None:
     both = {"omega": 1.2, "kappa": 1e4}
-    assert Given(runtime.msf, both, {}).scene(Scene()) == Given(runtime.msf, {"omega": 1.2}, {"kappa": 1e4}).scene(
+    assert Given(synchain.msf, both, {}).scene(Scene()) == Given(synchain.msf, {"omega": 1.2}, {"kappa": 1e4}).scene(
         Scene()
     )
-    by_name = runtime.run(PAIR, sigma=[0.1, 0.2], x_1=0.5, show_progress=False)
-    by_table = runtime.run(PAIR, parameters={"sigma": [0.1, 0.2], "x_1": 0.5}, show_progress=False)
-    mixed = runtime.run(PAIR, sigma=[0.1, 0.2], parameters={"x_1": 0.5}, show_progress=False)
+    by_name = synchain.run(PAIR, sigma=[0.1, 0.2], x_1=0.5, show_progress=False)
+    by_table = synchain.run(PAIR, parameters={"sigma": [0.1, 0.2], "x_1": 0.5}, show_progress=False)
+    mixed = synchain.run(PAIR, sigma=[0.1, 0.2], parameters={"x_1": 0.5}, show_progress=False)
     assert by_name.data.identical(by_table.data)
     assert by_name.data.identical(mixed.data)
     assert by_name.scene.initial["x"][0] == 0.5
@@ -298,18 +299,18 @@ def test_progress_of_orbits_counts_periods_and_values() -> None:
     options = {"show_progress": False, "progress": heard.append}
     rossler = Scene(oscillator="rossler", coupling="x->x", topology=chain(2))
     for call in (
-        lambda: runtime.exponents(rossler, [0.1], starts=1, transient=10, periods=20, **options),
-        lambda: runtime.msf(rossler, [0.1, 0.2], starts=1, transient=10, periods=20, **options),
-        lambda: runtime.plane(rossler, [0.1, 0.2], [0.0, 0.1], starts=1, transient=10, periods=20, **options),
-        lambda: runtime.cluster_exponents(rossler, [0, 0], transient=10, periods=20, **options),
-        lambda: runtime.lyapunov_spectrum(rossler, transient=10, periods=20, **options),
+        lambda: synchain.exponents(rossler, [0.1], starts=1, transient=10, periods=20, **options),
+        lambda: synchain.msf(rossler, [0.1, 0.2], starts=1, transient=10, periods=20, **options),
+        lambda: synchain.plane(rossler, [0.1, 0.2], [0.0, 0.1], starts=1, transient=10, periods=20, **options),
+        lambda: synchain.cluster_exponents(rossler, [0, 0], transient=10, periods=20, **options),
+        lambda: synchain.lyapunov_spectrum(rossler, transient=10, periods=20, **options),
     ):
         heard.clear()
         call()
         assert (heard[0].done, heard[-1].done, heard[-1].total, heard[-1].unit) == (0, 30, 30, "period")
         assert [p.done for p in heard] == sorted({p.done for p in heard})
     heard.clear()
-    runtime.skeleton(DRIVEN, "omega", [1.3, 1.31], (1,), 2, **options)
+    synchain.skeleton(DRIVEN, "omega", [1.3, 1.31], (1,), 2, **options)
     assert [(p.done, p.total) for p in heard] == [(0, 2), (1, 2), (2, 2)]
     assert "2 of 2 values (100 %)" in str(heard[-1])
 
@@ -332,18 +333,18 @@ def test_seed_and_transient_of_a_skeleton_are_used(monkeypatch: pytest.MonkeyPat
         "settled",
         lambda problem, starts, length: asked.append(("transient", length)) or settled(problem, starts, length),
     )
-    runtime.skeleton(DRIVEN, "omega", [1.3], (1,), 1, transient=7, seed=3, show_progress=False)
+    synchain.skeleton(DRIVEN, "omega", [1.3], (1,), 1, transient=7, seed=3, show_progress=False)
     assert asked == [("seed", 3), ("transient", 7.0)]
 
 
 FIELDS: dict[str, Any] = {"rtol": 1e-5, "transient": 3.0, "window": 2.5, "seed": 3}
 OPEN = Criterion(starts=2, tolerance=1.0, reach=0.1)
 SIMULATIONS = {
-    "basin": lambda scene: runtime.basin(scene, samples=2, ranges={"x": (-1.0, 1.0)}, show_progress=False),
-    "thresholds": lambda scene: runtime.thresholds(
+    "basin": lambda scene: synchain.basin(scene, samples=2, ranges={"x": (-1.0, 1.0)}, show_progress=False),
+    "thresholds": lambda scene: synchain.thresholds(
         scene, sigma=[0.1, 0.2], criterion=OPEN, resolution=1.0, periods=2, show_progress=False
     ),
-    "universal_probe": lambda scene: runtime.universal_probe(scene, 0.1, 0.0, criterion=OPEN, show_progress=False),
+    "universal_probe": lambda scene: synchain.universal_probe(scene, 0.1, 0.0, criterion=OPEN, show_progress=False),
     "agreement": lambda scene: agreement(scene, [0.1], criterion=OPEN, show_progress=False),
 }
 
@@ -404,11 +405,11 @@ def test_simulations_obey_or_refuse_every_field_of_a_scene(name: str) -> None:
 
 
 AVERAGES: dict[str, Callable[..., Any]] = {
-    "exponents": lambda scene, **w: runtime.exponents(scene, [0.1, 0.2], starts=2, **w).by_start,
-    "msf": lambda scene, **w: runtime.msf(scene, [0.1, 0.2], starts=2, **w).fine.by_start,
-    "plane": lambda scene, **w: runtime.plane(scene, [0.1, 0.2], [0.0, 0.1], starts=2, **w).exponent,
-    "cluster_exponents": lambda scene, **w: runtime.cluster_exponents(scene, [0, 0], **w).exponent,
-    "lyapunov_spectrum": lambda scene, **w: runtime.lyapunov_spectrum(scene, **w).exponent,
+    "exponents": lambda scene, **w: synchain.exponents(scene, [0.1, 0.2], starts=2, **w).by_start,
+    "msf": lambda scene, **w: synchain.msf(scene, [0.1, 0.2], starts=2, **w).fine.by_start,
+    "plane": lambda scene, **w: synchain.plane(scene, [0.1, 0.2], [0.0, 0.1], starts=2, **w).exponent,
+    "cluster_exponents": lambda scene, **w: synchain.cluster_exponents(scene, [0, 0], **w).exponent,
+    "lyapunov_spectrum": lambda scene, **w: synchain.lyapunov_spectrum(scene, **w).exponent,
 }
 ROSSLER = Scene("rossler", "x->x", chain(2), parameters={"sigma": 0.1}, integrator="taylor", transient=10.0)
 GIVEN: dict[str, Any] = {
@@ -444,14 +445,14 @@ def test_the_transient_of_a_scene_counts_in_its_own_unit() -> None:
     """Periods of a drive, whole ones; units of time without a drive, in as many mean return times."""
     words: dict[str, Any] = {"starts": 1, "periods": 4, "show_progress": False}
     driven = DRIVEN.replace(transient=19.2)
-    expected = runtime.exponents(DRIVEN, [0.1], transient=20, **words).exponent
-    np.testing.assert_array_equal(runtime.exponents(driven, [0.1], **words).exponent, expected)
-    free = runtime.exponents(ROSSLER, [0.1], **words)
+    expected = synchain.exponents(DRIVEN, [0.1], transient=20, **words).exponent
+    np.testing.assert_array_equal(synchain.exponents(driven, [0.1], **words).exponent, expected)
+    free = synchain.exponents(ROSSLER, [0.1], **words)
     turn = float(free.unit.partition(",")[2].split()[0])
-    counted = runtime.exponents(ROSSLER, [0.1], transient=int(np.ceil(10.0 / turn)), **words)
+    counted = synchain.exponents(ROSSLER, [0.1], transient=int(np.ceil(10.0 / turn)), **words)
     np.testing.assert_array_equal(free.exponent, counted.exponent)
     heard: list[Progress] = []
-    runtime.exponents(ROSSLER, [0.1], progress=heard.append, **words)
+    synchain.exponents(ROSSLER, [0.1], progress=heard.append, **words)
     assert heard[0].total == np.ceil(10.0 / turn) + 4
 
 
@@ -459,9 +460,9 @@ def test_defaults_of_functions_hold_where_a_scene_was_given_nothing(monkeypatch:
     plain = ROSSLER.replace(transient=300.0)
     words: dict[str, Any] = {"starts": 1, "periods": 1, "show_progress": False}
     heard: list[Progress] = []
-    found = runtime.exponents(plain, [0.1], progress=heard.append, **words)
+    found = synchain.exponents(plain, [0.1], progress=heard.append, **words)
     assert heard[0].total == 301
-    same = runtime.exponents(plain, [0.1], transient=300, rtol=1e-6, seed=0, **words)
+    same = synchain.exponents(plain, [0.1], transient=300, rtol=1e-6, seed=0, **words)
     np.testing.assert_array_equal(found.exponent, same.exponent)
 
 
@@ -478,7 +479,7 @@ def test_skeletons_obey_the_transient_and_the_seed_of_a_scene(monkeypatch: pytes
         ({"transient": 10.0, "time_unit": "time"}, [0, 10.0 / (2 * np.pi / 1.3)]),
     ):
         asked.clear()
-        runtime.skeleton(DRIVEN.replace(**changes), "omega", [1.3], (1,), 1, show_progress=False)
+        synchain.skeleton(DRIVEN.replace(**changes), "omega", [1.3], (1,), 1, show_progress=False)
         assert asked == pytest.approx(expected)
 
 
@@ -489,7 +490,7 @@ def test_basins_end_where_a_scene_stops() -> None:
 
 def test_an_executor_runs_the_cells_of_the_probe_and_parameters_reach_it() -> None:
     with ThreadPoolExecutor(1) as pool:
-        result = runtime.universal_probe(
+        result = synchain.universal_probe(
             DRIVEN, [0.1], [0.0], criterion=SHORT, executor=pool, parameters={"delta": 0.7}, show_progress=False
         )
     assert result.scene.parameters["delta"] == 0.7

@@ -12,11 +12,12 @@ from pendula import ByHand, of_energies, pendulum, real, telescope
 from scipy.integrate import solve_ivp
 
 import synchain.runtime
+from synchain import Scene, run
 from synchain.codegen.export import to_c
-from synchain.models import Scene, chain, latex, text
+from synchain.export import latex, text
+from synchain.graphs import chain
 from synchain.models.dynamics.network import node
 from synchain.models.dynamics.variational import mode, network_variation
-from synchain.runtime import run
 from synchain.runtime.cells.paces import Templates
 from synchain.runtime.engines.scene_kernels import kernel_source
 
@@ -133,9 +134,9 @@ def test_variational_equations_of_a_mass_matrix_are_refused(derived):
 def test_exponents_of_a_mass_matrix_are_refused():
     scene = Scene(oscillator=pendulum(4), coupling="spring on q1", topology=chain(2), record=())
     with pytest.raises(ValueError, match="found nodes with a mass matrix"):
-        synchain.runtime.thresholds(scene)
+        synchain.thresholds(scene)
     with pytest.raises(ValueError, match="found nodes with a mass matrix"):
-        synchain.runtime.msf(scene, [0.0, 1.0])
+        synchain.msf(scene, [0.0, 1.0])
 
 
 def test_large_networks_of_a_mass_matrix_are_not_exported():

@@ -17,9 +17,10 @@ import sympy as sp
 from catalogue import FUZZ_SECONDS
 from scipy.integrate import solve_ivp
 
-from synchain.models import Field, Lagrangian, Scene, chain
+from synchain import Field, Lagrangian, Scene, run
+from synchain.graphs import chain
 from synchain.models.mechanics.components import TIME
-from synchain.runtime import Status, run
+from synchain.results import Status
 
 MODELS = 12
 """Models where no time is given."""

@@ -15,10 +15,10 @@ import pytest
 import scipy.sparse
 from catalogue import PAIR
 
-from synchain import models, runtime
-from synchain.models import Scene, Section, Spectrum, Topology, chain, star
+import synchain
+from synchain import Criterion, Scene, Section
+from synchain.graphs import Spectrum, Topology, chain, star
 from synchain.models.symmetries.clusters import clusters, orbital_partitions
-from synchain.runtime import Criterion
 from synchain.runtime.cells.run_keywords import Given
 from synchain.runtime.results.energy_of_states import energy_function
 from synchain.runtime.results.labelled import Labelled
@@ -35,15 +35,15 @@ A_GRAPH = r"expected a graph, e.g. chain\(4\)"
 
 CALLS = [
     # models
-    (lambda: models.Axis("a", np.ones((2, 2))), r"array of shape \(2, 2\); expected one row"),
-    (lambda: models.Axis("a", [NAN]), "found nan; expected a finite number"),
+    (lambda: synchain.Axis("a", np.ones((2, 2))), r"array of shape \(2, 2\); expected one row"),
+    (lambda: synchain.Axis("a", [NAN]), "found nan; expected a finite number"),
     (lambda: PAIR.replace(parameters=3), r"parameters: found 3 \(int\); expected a table"),
     (lambda: PAIR.replace(simga=3), "unknown parameter or keyword 'simga'.*did you mean 'sigma'"),
     (lambda: PAIR.takes(3), "name: found 3"),
-    (lambda: models.text(PAIR), r"text: found Scene.*expected equations, such as scene\.equations"),
-    (lambda: models.latex(3), r"latex: found 3 \(int\); expected equations"),
-    (lambda: models.joint_spectrum(chain(2)), r"joint_spectrum: found Topology.*expected several graphs"),
-    (lambda: models.allow_code(3), "plug-in: found 3"),
+    (lambda: synchain.export.text(PAIR), r"text: found Scene.*expected equations, such as scene\.equations"),
+    (lambda: synchain.export.latex(3), r"latex: found 3 \(int\); expected equations"),
+    (lambda: synchain.graphs.joint_spectrum(chain(2)), r"joint_spectrum: found Topology.*expected several graphs"),
+    (lambda: synchain.plugins.allow_code(3), "plug-in: found 3"),
     (lambda: Section(3), "section variable: found 3"),
     (lambda: Spectrum(3), "spectrum: found 3"),
     (lambda: Spectrum([3]), "expected an Eigenvalue"),
@@ -53,147 +53,150 @@ CALLS = [
     (lambda: Topology("a", 3, ((0, 1),)), r"link \(0, 1\); expected \(target, source, weight\)"),
     (lambda: Topology("a", 2, (("a", "b", Fraction(1)),)), r"expected \(target, source, weight\)"),
     (lambda: Topology(3, 2, ()), "topology name: found 3"),
-    (lambda: models.cartesian(3, 4), f"cartesian: first: found 3.*{A_GRAPH}"),
-    (lambda: models.cartesian(chain(3), "ring"), f"cartesian: second: found 'ring'.*{A_GRAPH}"),
-    (lambda: models.kronecker(chain(3), None), f"kronecker: second: found None; {A_GRAPH}"),
-    (lambda: models.union(3, chain(3)), f"union: first: found 3.*{A_GRAPH}"),
-    (lambda: models.complement([(0, 1)]), "complement: found .*make one of a list with from_edges"),
-    (lambda: models.weighted("chain", 2), f"weighted: found 'chain'.*{A_GRAPH}"),
-    (lambda: models.from_edges(3), "expected a list of edges"),
-    (lambda: models.ring(), r"^topology ring: found 0 arguments for n; expected ring\(n: int\)$"),
+    (lambda: synchain.graphs.cartesian(3, 4), f"cartesian: first: found 3.*{A_GRAPH}"),
+    (lambda: synchain.graphs.cartesian(chain(3), "ring"), f"cartesian: second: found 'ring'.*{A_GRAPH}"),
+    (lambda: synchain.graphs.kronecker(chain(3), None), f"kronecker: second: found None; {A_GRAPH}"),
+    (lambda: synchain.graphs.union(3, chain(3)), f"union: first: found 3.*{A_GRAPH}"),
+    (lambda: synchain.graphs.complement([(0, 1)]), "complement: found .*make one of a list with from_edges"),
+    (lambda: synchain.graphs.weighted("chain", 2), f"weighted: found 'chain'.*{A_GRAPH}"),
+    (lambda: synchain.graphs.from_edges(3), "expected a list of edges"),
+    (lambda: synchain.graphs.ring(), r"^topology ring: found 0 arguments for n; expected ring\(n: int\)$"),
     (
-        lambda: models.small_world(10, 4),
+        lambda: synchain.graphs.small_world(10, 4),
         r"^topology small_world: found 2 arguments for n; expected .*\*, neighbours=4,",
     ),
-    (lambda: models.ring(3, n=4), "topology ring: found 2 arguments for n"),
-    (lambda: models.from_edges([{0, 1}]), r"edge 1 is \{0, 1\}; expected \(i, j\)"),
-    (lambda: models.from_edges([{"a": 1, "b": 2}]), "edge 1 is"),
-    (lambda: models.from_edges([(0, 1)], directed="no"), "directed: found 'no'"),
-    (lambda: models.from_edges([({0}, 1)]), r"node: found \{0\} \(set\); expected a label"),
-    (lambda: models.from_matrix(scipy.sparse.eye(3)), "read by from_sparse"),
-    (lambda: models.from_sparse(scipy.sparse.coo_array(np.ones(3))), "expected a square matrix"),
-    (lambda: models.from_symbols(3), "is a int; expected rows"),
-    (lambda: models.from_symbols([3]), "row 1 is 3"),
-    (lambda: models.read_edges(3), "edge file: found 3"),
-    (lambda: models.read_graphml(None), "GraphML file: found None"),
-    (lambda: models.read_matrix(""), "matrix file: found ''"),
+    (lambda: synchain.graphs.ring(3, n=4), "topology ring: found 2 arguments for n"),
+    (lambda: synchain.graphs.from_edges([{0, 1}]), r"edge 1 is \{0, 1\}; expected \(i, j\)"),
+    (lambda: synchain.graphs.from_edges([{"a": 1, "b": 2}]), "edge 1 is"),
+    (lambda: synchain.graphs.from_edges([(0, 1)], directed="no"), "directed: found 'no'"),
+    (lambda: synchain.graphs.from_edges([({0}, 1)]), r"node: found \{0\} \(set\); expected a label"),
+    (lambda: synchain.graphs.from_matrix(scipy.sparse.eye(3)), "read by from_sparse"),
+    (lambda: synchain.graphs.from_sparse(scipy.sparse.coo_array(np.ones(3))), "expected a square matrix"),
+    (lambda: synchain.graphs.from_symbols(3), "is a int; expected rows"),
+    (lambda: synchain.graphs.from_symbols([3]), "row 1 is 3"),
+    (lambda: synchain.graphs.read_edges(3), "edge file: found 3"),
+    (lambda: synchain.graphs.read_graphml(None), "GraphML file: found None"),
+    (lambda: synchain.graphs.read_matrix(""), "matrix file: found ''"),
     (lambda: chain(2.5), r"n = 2\.5 is a float; expected an integer"),
     (lambda: chain(True), "n = True is a bool"),
     (lambda: clusters(chain(2), 3), "partition: found 3"),
     (lambda: clusters("chain", [0]), f"clusters: found 'chain'.*{A_GRAPH}"),
     (lambda: orbital_partitions(4), A_GRAPH),
     # sweeps
-    (lambda: runtime.run("figure_4a"), f"found 'figure_4a'.*{A_SCENE}"),
-    (lambda: runtime.run(Scene), A_SCENE),
-    (lambda: runtime.run(PAIR, sigma=np.ones((2, 2))), "axis sigma: found an array of shape"),
-    (lambda: runtime.run(PAIR, sigma=["a"]), "axis sigma: 'a'"),
-    (lambda: runtime.run(PAIR, sigma=[NAN]), "axis sigma: found nan"),
-    (lambda: runtime.run(PAIR, sigma=[None]), "axis sigma: found None"),
-    (lambda: runtime.run(PAIR, sigma=[[1, 2], [3]]), r"axis sigma: found \[1, 2\]"),
-    (lambda: runtime.run(PAIR, sigma={1, 2}), "found a set, which has no order"),
-    (lambda: runtime.run(PAIR, x_1=None), "x_1: found None"),
-    (lambda: runtime.run(PAIR, lanes=4), "unknown parameter or keyword 'lanes' of run; known: sigma, x_1"),
-    (lambda: runtime.run(PAIR, workers=1.5), r"workers = 1\.5; expected a whole number"),
-    (lambda: runtime.run(PAIR, workers="2"), "workers = '2'"),
-    (lambda: runtime.run(PAIR, workers=True), "workers = True"),
-    (lambda: runtime.run(PAIR, workers=-1), "workers = -1; expected at least 1"),
-    (lambda: runtime.run(PAIR, width=3), "width = 3; expected one of 1, 2, 4, 8, 16"),
-    (lambda: runtime.run(PAIR, width="a"), "width = 'a'"),
-    (lambda: runtime.run(PAIR, reduce="no"), "reduce: found 'no'"),
-    (lambda: runtime.run(PAIR, certified="yes"), "certified: found 'yes'"),
-    (lambda: runtime.run(PAIR, resume="file.nc"), "resume: found 'file.nc'"),
-    (lambda: runtime.run(PAIR, executor=THREADS), "executor: found <class"),
-    (lambda: runtime.run(PAIR, progress=3), "progress: found 3"),
-    (lambda: runtime.run(PAIR, show_progress="x"), "show_progress: found 'x'"),
-    (lambda: runtime.stream("x", "y.nc"), A_SCENE),
-    (lambda: runtime.stream(PAIR, 3), "path: found 3"),
-    (lambda: runtime.stream(PAIR, ""), "path: found ''"),
-    (lambda: runtime.stream(PAIR, "a\0b"), "path: found"),
-    (lambda: runtime.stream(PAIR, "a.nc", resume="yes"), "resume: found 'yes'"),
-    (lambda: runtime.stream(PAIR, "a.nc", executor=3), "executor: found 3"),
-    (lambda: runtime.stream(PAIR, "a.nc", progress=3), "progress: found 3"),
-    (lambda: runtime.kernel("figure_4a"), A_SCENE),
-    (lambda: runtime.kernel(PAIR, width=0), "width = 0; expected at least 1"),
-    (lambda: runtime.open_result(3), "result: found 3"),
-    (lambda: runtime.open_result("no/such/file.nc"), "does not exist; expected a result: check the path"),
-    (lambda: runtime.open_result(Path(__file__).parent), "is a folder; expected a file: name the file in it"),
-    (lambda: runtime.open_result(__file__), "is no netCDF file; expected a netCDF 3 result"),
-    (lambda: runtime.Result(None, None), r"data: found None; expected an xarray\.Dataset"),
+    (lambda: synchain.run("figure_4a"), f"found 'figure_4a'.*{A_SCENE}"),
+    (lambda: synchain.run(Scene), A_SCENE),
+    (lambda: synchain.run(PAIR, sigma=np.ones((2, 2))), "axis sigma: found an array of shape"),
+    (lambda: synchain.run(PAIR, sigma=["a"]), "axis sigma: 'a'"),
+    (lambda: synchain.run(PAIR, sigma=[NAN]), "axis sigma: found nan"),
+    (lambda: synchain.run(PAIR, sigma=[None]), "axis sigma: found None"),
+    (lambda: synchain.run(PAIR, sigma=[[1, 2], [3]]), r"axis sigma: found \[1, 2\]"),
+    (lambda: synchain.run(PAIR, sigma={1, 2}), "found a set, which has no order"),
+    (lambda: synchain.run(PAIR, x_1=None), "x_1: found None"),
+    (lambda: synchain.run(PAIR, lanes=4), "unknown parameter or keyword 'lanes' of run; known: sigma, x_1"),
+    (lambda: synchain.run(PAIR, workers=1.5), r"workers = 1\.5; expected a whole number"),
+    (lambda: synchain.run(PAIR, workers="2"), "workers = '2'"),
+    (lambda: synchain.run(PAIR, workers=True), "workers = True"),
+    (lambda: synchain.run(PAIR, workers=-1), "workers = -1; expected at least 1"),
+    (lambda: synchain.run(PAIR, width=3), "width = 3; expected one of 1, 2, 4, 8, 16"),
+    (lambda: synchain.run(PAIR, width="a"), "width = 'a'"),
+    (lambda: synchain.run(PAIR, reduce="no"), "reduce: found 'no'"),
+    (lambda: synchain.run(PAIR, certified="yes"), "certified: found 'yes'"),
+    (lambda: synchain.run(PAIR, resume="file.nc"), "resume: found 'file.nc'"),
+    (lambda: synchain.run(PAIR, executor=THREADS), "executor: found <class"),
+    (lambda: synchain.run(PAIR, progress=3), "progress: found 3"),
+    (lambda: synchain.run(PAIR, show_progress="x"), "show_progress: found 'x'"),
+    (lambda: synchain.stream("x", "y.nc"), A_SCENE),
+    (lambda: synchain.stream(PAIR, 3), "path: found 3"),
+    (lambda: synchain.stream(PAIR, ""), "path: found ''"),
+    (lambda: synchain.stream(PAIR, "a\0b"), "path: found"),
+    (lambda: synchain.stream(PAIR, "a.nc", resume="yes"), "resume: found 'yes'"),
+    (lambda: synchain.stream(PAIR, "a.nc", executor=3), "executor: found 3"),
+    (lambda: synchain.stream(PAIR, "a.nc", progress=3), "progress: found 3"),
+    (lambda: synchain.kernel("figure_4a"), A_SCENE),
+    (lambda: synchain.kernel(PAIR, width=0), "width = 0; expected at least 1"),
+    (lambda: synchain.open_result(3), "result: found 3"),
+    (lambda: synchain.open_result("no/such/file.nc"), "does not exist; expected a result: check the path"),
+    (lambda: synchain.open_result(Path(__file__).parent), "is a folder; expected a file: name the file in it"),
+    (lambda: synchain.open_result(__file__), "is no netCDF file; expected a netCDF 3 result"),
+    (lambda: synchain.results.Result(None, None), r"data: found None; expected an xarray\.Dataset"),
     # starts, thresholds, probe
-    (lambda: runtime.basin("a"), A_SCENE),
-    (lambda: runtime.basin(PAIR, ranges=3), "ranges: found 3"),
-    (lambda: runtime.basin(PAIR, ranges={"x": 3}), "range of x"),
-    (lambda: runtime.basin(PAIR, ranges={"x": ("a", "b")}), "range of x: found"),
-    (lambda: runtime.basin(PAIR, tolerance="a"), "tolerance: 'a'"),
-    (lambda: runtime.basin(PAIR, seed=-1), "seed = -1"),
-    (lambda: runtime.basin(PAIR, samples=10**12), "samples = 1000000000000; expected at most 10000000"),
-    (lambda: runtime.basin(PAIR, smaples=3), "unknown parameter or keyword 'smaples' of basin.*did you mean 'samples'"),
-    (lambda: runtime.run(PAIR, worker=2), "'worker' of run.*did you mean 'workers'"),
-    (lambda: runtime.run(PAIR, sgima=2), "'sgima' of run.*did you mean 'sigma'"),
-    (lambda: runtime.stream(PAIR, "a.nc", overwrit=True), "'overwrit' of stream.*did you mean 'overwrite'"),
-    (lambda: runtime.thresholds(PAIR, resolutoin=1), "'resolutoin' of thresholds.*did you mean 'resolution'"),
+    (lambda: synchain.basin("a"), A_SCENE),
+    (lambda: synchain.basin(PAIR, ranges=3), "ranges: found 3"),
+    (lambda: synchain.basin(PAIR, ranges={"x": 3}), "range of x"),
+    (lambda: synchain.basin(PAIR, ranges={"x": ("a", "b")}), "range of x: found"),
+    (lambda: synchain.basin(PAIR, tolerance="a"), "tolerance: 'a'"),
+    (lambda: synchain.basin(PAIR, seed=-1), "seed = -1"),
+    (lambda: synchain.basin(PAIR, samples=10**12), "samples = 1000000000000; expected at most 10000000"),
     (
-        lambda: runtime.thresholds(PAIR, record=()),
+        lambda: synchain.basin(PAIR, smaples=3),
+        "unknown parameter or keyword 'smaples' of basin.*did you mean 'samples'",
+    ),
+    (lambda: synchain.run(PAIR, worker=2), "'worker' of run.*did you mean 'workers'"),
+    (lambda: synchain.run(PAIR, sgima=2), "'sgima' of run.*did you mean 'sigma'"),
+    (lambda: synchain.stream(PAIR, "a.nc", overwrit=True), "'overwrit' of stream.*did you mean 'overwrite'"),
+    (lambda: synchain.thresholds(PAIR, resolutoin=1), "'resolutoin' of thresholds.*did you mean 'resolution'"),
+    (
+        lambda: synchain.thresholds(PAIR, record=()),
         r"thresholds: 'record' is a field of the scene.*write scene\.replace\(record=…\)",
     ),
-    (lambda: runtime.exponents(PAIR, 0.1, perods=5), "'perods' of exponents.*did you mean 'periods'"),
+    (lambda: synchain.exponents(PAIR, 0.1, perods=5), "'perods' of exponents.*did you mean 'periods'"),
     (
-        lambda: runtime.exponents(PAIR, 0.1, atol=5),
+        lambda: synchain.exponents(PAIR, 0.1, atol=5),
         r"exponents: 'atol' is a field of the scene; expected parameters; write scene\.replace\(atol=…\)",
     ),
-    (lambda: runtime.msf(PAIR, [0, 1], perods=5), "'perods' of msf.*did you mean 'periods'"),
-    (lambda: runtime.plane(PAIR, [0, 1], [0, 1], perods=5), "'perods' of plane.*did you mean 'periods'"),
-    (lambda: runtime.lyapunov_spectrum(PAIR, cuont=5), "'cuont' of lyapunov_spectrum.*did you mean 'count'"),
-    (lambda: runtime.cluster_exponents(PAIR, [0, 0], perods=5), "of cluster_exponents.*did you mean 'periods'"),
+    (lambda: synchain.msf(PAIR, [0, 1], perods=5), "'perods' of msf.*did you mean 'periods'"),
+    (lambda: synchain.plane(PAIR, [0, 1], [0, 1], perods=5), "'perods' of plane.*did you mean 'periods'"),
+    (lambda: synchain.lyapunov_spectrum(PAIR, cuont=5), "'cuont' of lyapunov_spectrum.*did you mean 'count'"),
+    (lambda: synchain.cluster_exponents(PAIR, [0, 0], perods=5), "of cluster_exponents.*did you mean 'periods'"),
     (lambda: agreement(PAIR, [0.1], criterium=3), "'criterium' of agreement.*did you mean 'criterion'"),
-    (lambda: runtime.periodic_orbit(Scene(), perods=2), "'perods' of periodic_orbit.*did you mean 'periods'"),
-    (lambda: runtime.exponents(Scene(oscillator="lorenz"), [0.1]), "name the components that a link joins"),
-    (lambda: runtime.thresholds(None), A_SCENE),
-    (lambda: runtime.thresholds(ONE), "has no links"),
-    (lambda: runtime.thresholds(PAIR, sigma="a"), "sigma: found 'a'; expected real numbers"),
-    (lambda: runtime.thresholds(PAIR, sigma=3), r"array of shape \(\); expected a row of at least 2"),
-    (lambda: runtime.thresholds(PAIR, sigma=[0.2, 0.1]), "do not increase"),
-    (lambda: runtime.thresholds(PAIR, sigma=[NAN, 1]), "sigma: found nan"),
-    (lambda: runtime.thresholds(PAIR, resolution="a"), "resolution: 'a'"),
-    (lambda: runtime.thresholds(PAIR, criterion={"starts": 2}), "criterion: found {'starts': 2}"),
+    (lambda: synchain.periodic_orbit(Scene(), perods=2), "'perods' of periodic_orbit.*did you mean 'periods'"),
+    (lambda: synchain.exponents(Scene(oscillator="lorenz"), [0.1]), "name the components that a link joins"),
+    (lambda: synchain.thresholds(None), A_SCENE),
+    (lambda: synchain.thresholds(ONE), "has no links"),
+    (lambda: synchain.thresholds(PAIR, sigma="a"), "sigma: found 'a'; expected real numbers"),
+    (lambda: synchain.thresholds(PAIR, sigma=3), r"array of shape \(\); expected a row of at least 2"),
+    (lambda: synchain.thresholds(PAIR, sigma=[0.2, 0.1]), "do not increase"),
+    (lambda: synchain.thresholds(PAIR, sigma=[NAN, 1]), "sigma: found nan"),
+    (lambda: synchain.thresholds(PAIR, resolution="a"), "resolution: 'a'"),
+    (lambda: synchain.thresholds(PAIR, criterion={"starts": 2}), "criterion: found {'starts': 2}"),
     (lambda: Criterion(starts=1.5), r"starts = 1\.5; expected a whole number"),
     (lambda: Criterion(tolerance="a"), "tolerance: 'a'"),
     (lambda: Criterion(reach=NAN), "reach: found nan"),
     (lambda: Criterion(seed="a"), "seed = 'a'"),
-    (lambda: runtime.universal_probe(3, 0, 0), A_SCENE),
-    (lambda: runtime.universal_probe(PAIR, "a", 0), "alpha: found 'a'; expected real numbers"),
-    (lambda: runtime.universal_probe(PAIR, 1j, 0), "alpha: found 1j"),
-    (lambda: runtime.universal_probe(PAIR, [1, 2], [1, 2, 3]), r"shapes \(2,\) and \(3,\)"),
+    (lambda: synchain.universal_probe(3, 0, 0), A_SCENE),
+    (lambda: synchain.universal_probe(PAIR, "a", 0), "alpha: found 'a'; expected real numbers"),
+    (lambda: synchain.universal_probe(PAIR, 1j, 0), "alpha: found 1j"),
+    (lambda: synchain.universal_probe(PAIR, [1, 2], [1, 2, 3]), r"shapes \(2,\) and \(3,\)"),
     # exponents
-    (lambda: runtime.exponents(None, [0.1]), A_SCENE),
-    (lambda: runtime.exponents(PAIR, "a"), "alpha: found 'a'; expected numbers"),
-    (lambda: runtime.exponents(PAIR, []), "expected a row of at least 1 number"),
-    (lambda: runtime.exponents(PAIR, [[1, 2], [3, 4]]), r"array of shape \(2, 2\)"),
-    (lambda: runtime.exponents(PAIR, {1, 2}), "alpha: found {1, 2}"),
-    (lambda: runtime.exponents(PAIR, 0.1, starts=1.5), r"starts = 1\.5"),
-    (lambda: runtime.exponents(PAIR, 0.1, periods=0), "periods: found 0; expected a number above 0"),
-    (lambda: runtime.exponents(PAIR, 0.1, periods=-1), "periods: found -1; expected a number above 0"),
-    (lambda: runtime.msf(PAIR, [math.nan]), "alpha: found nan; expected finite numbers"),
-    (lambda: runtime.msf(PAIR, [0, 1e308]), r"alpha: found 1e\+308; expected numbers of at most 1e\+300 in size"),
-    (lambda: runtime.exponents(PAIR, [complex(1e308, 1e308)]), r"alpha: found 1e\+308\+1e\+308j; expected"),
-    (lambda: runtime.exponents(PAIR, 0.1, periods=math.inf), "periods: found inf"),
-    (lambda: runtime.exponents(PAIR, 0.1, transient=-1), "transient: found -1"),
-    (lambda: runtime.exponents(PAIR, 0.1, precision="a"), "precision: 'a'"),
-    (lambda: runtime.exponents(PAIR, 0.1, seed="a"), "seed = 'a'"),
-    (lambda: runtime.exponents(PAIR, 0.1, workers="a"), "workers = 'a'"),
-    (lambda: runtime.exponents(PAIR, 0.1, show_progress="no"), "show_progress: found 'no'"),
-    (lambda: runtime.thresholds(PAIR, executor=3), "executor: found 3"),
-    (lambda: runtime.basin(PAIR, progress=3), "progress: found 3"),
-    (lambda: runtime.msf("a", [0, 1]), A_SCENE),
-    (lambda: runtime.msf(PAIR, "x"), "alpha: found 'x'"),
-    (lambda: runtime.plane(PAIR, [0, 1], 3), "beta: found an array of shape"),
-    (lambda: runtime.lyapunov_spectrum("a"), A_SCENE),
-    (lambda: runtime.lyapunov_spectrum(PAIR, count=1.5), r"count = 1\.5"),
-    (lambda: runtime.lyapunov_spectrum(PAIR, periods="a"), "periods: 'a'"),
-    (lambda: runtime.cluster_exponents(None, [0, 0]), A_SCENE),
-    (lambda: runtime.cluster_exponents(PAIR, 3), "partition: found 3"),
-    (lambda: runtime.cluster_exponents(PAIR, [0, 0], periods=0), "periods: found 0"),
-    (lambda: runtime.periodic_orbit("a"), A_SCENE),
+    (lambda: synchain.exponents(None, [0.1]), A_SCENE),
+    (lambda: synchain.exponents(PAIR, "a"), "alpha: found 'a'; expected numbers"),
+    (lambda: synchain.exponents(PAIR, []), "expected a row of at least 1 number"),
+    (lambda: synchain.exponents(PAIR, [[1, 2], [3, 4]]), r"array of shape \(2, 2\)"),
+    (lambda: synchain.exponents(PAIR, {1, 2}), "alpha: found {1, 2}"),
+    (lambda: synchain.exponents(PAIR, 0.1, starts=1.5), r"starts = 1\.5"),
+    (lambda: synchain.exponents(PAIR, 0.1, periods=0), "periods: found 0; expected a number above 0"),
+    (lambda: synchain.exponents(PAIR, 0.1, periods=-1), "periods: found -1; expected a number above 0"),
+    (lambda: synchain.msf(PAIR, [math.nan]), "alpha: found nan; expected finite numbers"),
+    (lambda: synchain.msf(PAIR, [0, 1e308]), r"alpha: found 1e\+308; expected numbers of at most 1e\+300 in size"),
+    (lambda: synchain.exponents(PAIR, [complex(1e308, 1e308)]), r"alpha: found 1e\+308\+1e\+308j; expected"),
+    (lambda: synchain.exponents(PAIR, 0.1, periods=math.inf), "periods: found inf"),
+    (lambda: synchain.exponents(PAIR, 0.1, transient=-1), "transient: found -1"),
+    (lambda: synchain.exponents(PAIR, 0.1, precision="a"), "precision: 'a'"),
+    (lambda: synchain.exponents(PAIR, 0.1, seed="a"), "seed = 'a'"),
+    (lambda: synchain.exponents(PAIR, 0.1, workers="a"), "workers = 'a'"),
+    (lambda: synchain.exponents(PAIR, 0.1, show_progress="no"), "show_progress: found 'no'"),
+    (lambda: synchain.thresholds(PAIR, executor=3), "executor: found 3"),
+    (lambda: synchain.basin(PAIR, progress=3), "progress: found 3"),
+    (lambda: synchain.msf("a", [0, 1]), A_SCENE),
+    (lambda: synchain.msf(PAIR, "x"), "alpha: found 'x'"),
+    (lambda: synchain.plane(PAIR, [0, 1], 3), "beta: found an array of shape"),
+    (lambda: synchain.lyapunov_spectrum("a"), A_SCENE),
+    (lambda: synchain.lyapunov_spectrum(PAIR, count=1.5), r"count = 1\.5"),
+    (lambda: synchain.lyapunov_spectrum(PAIR, periods="a"), "periods: 'a'"),
+    (lambda: synchain.cluster_exponents(None, [0, 0]), A_SCENE),
+    (lambda: synchain.cluster_exponents(PAIR, 3), "partition: found 3"),
+    (lambda: synchain.cluster_exponents(PAIR, [0, 0], periods=0), "periods: found 0"),
+    (lambda: synchain.periodic_orbit("a"), A_SCENE),
     # energy
     (lambda: energy_function("a"), A_SCENE),
     (lambda: ENERGY([1, 2]), "expected rows of 4 numbers"),
@@ -215,9 +218,9 @@ def test_a_wrong_argument_is_refused_in_one_line(call, message, monkeypatch, tmp
 
 def test_what_is_right_is_taken():
     """Numbers of other types, and what only looks wrong."""
-    assert Given(runtime.run, {"sigma": range(2), "x_1": "sqrt(4)"}).sweep(PAIR).axes[0].values == (0.0, 1.0)
+    assert Given(synchain.run, {"sigma": range(2), "x_1": "sqrt(4)"}).sweep(PAIR).axes[0].values == (0.0, 1.0)
     assert worker_count(np.int64(2)) == 2
-    assert models.from_edges([[0, 1], (1, 2, "1/2"), np.array([2, 3])]).n == 4
+    assert synchain.graphs.from_edges([[0, 1], (1, 2, "1/2"), np.array([2, 3])]).n == 4
     assert clusters(star(5), "hpppp").quotients[0].n == 2
     assert Criterion(tolerance=1).tolerance == 1.0
     assert float(ENERGY([0, 1, 0, 0], parameters={"sigma": 0})) == 0.5
@@ -225,9 +228,9 @@ def test_what_is_right_is_taken():
 
 OFFERED = [
     value
-    for package in (models, runtime)
-    for value in (getattr(package, name) for name in package.__all__)
-    if inspect.isfunction(value) or (inspect.isclass(value) and value is not runtime.Status)
+    for module in (synchain, *(getattr(synchain, name) for name in synchain.MODULES))
+    for value in (getattr(module, name) for name in module.HOMES)
+    if inspect.isfunction(value) or (inspect.isclass(value) and value is not synchain.results.Status)
 ]
 """Public functions and classes; `Status` is an enumeration."""
 
@@ -285,7 +288,7 @@ def test_plots_refuse_unknown_keywords() -> None:
         with pytest.raises(TypeError, match=r"^save: found no 'path'; expected path$"):
             kind.save(object.__new__(kind))
     with pytest.raises(TypeError, match=r"^unknown keyword 'axes' of draw; known: ax"):
-        models.chain(3).draw(axes=1)
+        synchain.graphs.chain(3).draw(axes=1)
     with pytest.raises(TypeError, match=r"^replace: found 1 argument without a name; expected none$"):
         PAIR.replace(3)
 
@@ -298,10 +301,10 @@ def test_public_names_can_be_sent_to_other_processes(value: Any) -> None:
 def test_a_class_is_changed_once() -> None:
     for _ in range(3):
         callables = (
-            runtime.Criterion.__init__,
-            runtime.Result.plot,
-            runtime.Plane.as_dict,
-            models.Topology.to_networkx,
+            synchain.Criterion.__init__,
+            synchain.results.Result.plot,
+            synchain.results.Plane.as_dict,
+            synchain.graphs.Topology.to_networkx,
         )
     assert [hasattr(each.__wrapped__, "__wrapped__") for each in callables] == [False] * 4
 
@@ -310,4 +313,4 @@ def test_a_parameter_among_the_keywords_is_said_to_be_one() -> None:
     with pytest.raises(
         TypeError, match=r"unknown keyword 'k' of Field; .*; a parameter is given as parameters=\{'k': …\}"
     ):
-        models.Field({"x": "-k*x"}, k=2.0)
+        synchain.Field({"x": "-k*x"}, k=2.0)

@@ -22,7 +22,7 @@ def network(name: str) -> Equations:
     """Phases, pendulums, or pendulums in a ring with oscillators whose x is no angle."""
     if name == "phases":
         push = sc.Rates({"q": "W*(sin(q_j - q_i) + cos(q_j/2))"})
-        return sc.Scene(sc.Field({"q": "1 + sin(q)/2"}), push, sc.ring(4)).equations
+        return sc.Scene(sc.Field({"q": "1 + sin(q)/2"}), push, sc.graphs.ring(4)).equations
     x, v, x_there, v_there, w = real("x", "v", "x_there", "v_there", "weight")
     turning = Node((x, v), (v + 3 * sp.sin(x), -sp.sin(x) / 1000), ())  # so that x has larger errors than v
     swinging = Node((x, v), (v, -x / 1000), ())

@@ -4,7 +4,7 @@ x'' = -x + epsilon f(theta_b cos(nu t) - x').  A plug-in of the benchmark `stabi
 by its path: the oscillator `friction` with another motion of the belt.
 """
 
-from synchain.models import Lagrangian, Parameter
+from synchain import Lagrangian, Parameter
 
 OSCILLATOR = Lagrangian(
     T="v**2/2",

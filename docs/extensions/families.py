@@ -8,29 +8,29 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from synchain import models
+from synchain import graphs
 from synchain.models.graphs.families import Family
 
 
 class Families(SphinxDirective):
-    """One entry of the domain `py` for each family of `synchain.models`."""
+    """One entry of the domain `py` for each family of `synchain.graphs`."""
 
     def run(self) -> list[nodes.Node]:
         """Return the entries."""
         lines: list[str] = []
-        for name in dir(models):
-            family = getattr(models, name) if not name.startswith("_") else None
+        for name in dir(graphs):
+            family = getattr(graphs, name) if not name.startswith("_") else None
             if isinstance(family, Family):
                 call = signature(family)
                 lines += [f".. py:function:: {name}{call.replace(return_annotation=call.empty)}"]
-                lines += ["   :module: synchain.models", ""]
+                lines += ["   :module: synchain.graphs", ""]
                 lines += [f"   {line}" for line in _text(name, family)] + [""]
         return self.parse_text_to_nodes("\n".join(lines))
 
 
 def _text(name: str, family: Family) -> list[str]:
     """The paragraphs of a family, as lines."""
-    also = [f"Another name of :func:`~synchain.models.{family.name}`.", ""] if name != family.name else []
+    also = [f"Another name of :func:`~synchain.graphs.{family.name}`.", ""] if name != family.name else []
     source = ["", f"Source: {family.source}."] if family.source else []
     return [*also, f"{family.summary[0].upper()}{family.summary[1:]}; n ≥ {family.minimum}.", *source]
 

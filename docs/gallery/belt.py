@@ -19,7 +19,7 @@ import synchain as sc
 settings = {"contact": "set-valued", "record": ["trajectory"], "transient": 0, "time_unit": "time"}
 undriven = {"u": 0, "epsilon": 1, "theta_b": 0.2}
 start = {"x": [0.3, 0.1, -0.2, 0.4, 0.0]}
-scene = sc.Scene("friction", "spring", sc.chain(5), parameters=undriven, initial=start, window=40, **settings)
+scene = sc.Scene("friction", "spring", sc.graphs.chain(5), parameters=undriven, initial=start, window=40, **settings)
 result = sc.run(scene, sigma=0.3)
 
 # %%
@@ -29,7 +29,7 @@ result = sc.run(scene, sigma=0.3)
 import numpy as np
 
 law = sc.friction_law("mu_k*sign(w)", {"mu_s": 0.3, "mu_k": 0.15}, static="mu_s")
-model = {"topology": sc.chain(1), "parameters": undriven, "initial": {"x": 0.5}, "samples": 200_001}
+model = {"topology": sc.graphs.chain(1), "parameters": undriven, "initial": {"x": 0.5}, "samples": 200_001}
 alone = sc.run(sc.Scene("friction", friction=law, window=30, **model, **settings))
 x, v = (alone.trajectory.sel(component=name).values[50_000:, 0] for name in "xv")
 radius = np.hypot(1 * (0.3 - 0.15), 0.2)

@@ -36,13 +36,14 @@ pad = sc.Lagrangian(
     parameters={disc: 1.5, xi: 0.05},
 )
 law = {"mu_s": 1, "mu_k": 0.5, "a": 2}
-settings = {"observe": {"speed": sc.maximum(abs(v))}, "record": (), "time_unit": "time"}
+settings = {"observe": {"speed": sc.observe.maximum(abs(v))}, "record": (), "time_unit": "time"}
 one = sc.Scene(pad, parameters=law, transient=400, window=100, rtol=1e-6, **settings)
 speeds = [1.175, 1.25, 1.325, 1.4, 1.475, 1.55, 1.625, 1.7, 1.775, 1.85]
-basins = sc.run(one, v_d=speeds, realisations=1000, draws={"x": sc.uniform(-2, 2), "v": sc.uniform(0, 2)}, rng=1)
+starts = {"x": sc.draw.uniform(-2, 2), "v": sc.draw.uniform(0, 2)}
+basins = sc.run(one, v_d=speeds, realisations=1000, draws=starts, rng=1)
 n = 12
-parameters = law | {"sigma": 0.02}
-ring = sc.Scene(pad, "spring", sc.ring(n), parameters=parameters, transient=200, window=20, rtol=1e-10, **settings)
+joined = law | {"sigma": 0.02}
+ring = sc.Scene(pad, "spring", sc.graphs.ring(n), parameters=joined, transient=200, window=20, rtol=1e-10, **settings)
 pushed = sc.run(ring, realisations=n + 1, draws={"x": [[2] * k + [0.5] * (n - k) for k in range(n + 1)]})
 
 # %%

@@ -31,7 +31,7 @@ edges = [(a, b, weights[a // n][b // n]) for a in range(2 * n) for b in range(a)
 kernel = np.exp(2j * np.pi * (np.arange(n) + 0.5) / n)
 start = np.concatenate([np.full(n, -0.1), np.angle((0.7 + kernel) / (1 + 0.7 * kernel))])
 settings = {"transient": 0, "window": 200, "time_unit": "time", "record": ("trajectory",), "samples": 401}
-scene = sc.Scene(phase, sine, sc.from_edges(edges), initial={"theta": start.tolist()}, rtol=1e-7, **settings)
+scene = sc.Scene(phase, sine, sc.graphs.from_edges(edges), initial={"theta": start.tolist()}, rtol=1e-7, **settings)
 result = sc.run(scene)
 
 # %%

@@ -20,8 +20,8 @@ import numpy as np
 
 import synchain as sc
 
-two = sc.Scene(topology=sc.chain(2), parameters={"omega": 1.15})
-four = two.replace(topology=sc.chain(4), record=("sync_error",))
+two = sc.Scene(topology=sc.graphs.chain(2), parameters={"omega": 1.15})
+four = two.replace(topology=sc.graphs.chain(4), record=("sync_error",))
 function = sc.msf(two, np.linspace(0.0, 1.0, 101))
 window = sc.msf(four, np.linspace(0.0, 1.0, 101)).windows[0]
 result = sc.run(four, sigma=np.linspace(0.0, 0.25, 26))

@@ -34,14 +34,14 @@ pulse = 1 / (1 + sp.exp(-10 * (j.x + 0.25)))
 chemical = sc.Rates({i.x: -g * W * (i.x - 2) * pulse}, {g: 0.3})
 electrical = sc.Rates({i.x: k * W * (j.x - i.x)}, {k: 0.1})
 start = {"x": [-0.5, 0, 0.5, 1, -1], "y": 1, "z": 0}
-layers = [(electrical, sc.chain(5)), (chemical, sc.star(5))]
+layers = [(electrical, sc.graphs.chain(5)), (chemical, sc.graphs.star(5))]
 settings = {"transient": 0, "window": 450, "time_unit": "time", "record": ("trajectory",), "samples": 3001}
 both = sc.Scene(cell, links=layers, initial=start, rtol=1e-12, **settings)
 result = sc.run(both)
-pair = sc.Scene(cell, chemical, sc.chain(2), time_unit="time")
+pair = sc.Scene(cell, chemical, sc.graphs.chain(2), time_unit="time")
 modes = np.linspace(0.25, 2, 8)  # -γ/k of the modes of undirected graphs lies between 0 and 2
 exponents = {gk: sc.exponents(pair, gk * modes, g=gk, starts=1, periods=2000) for gk in (1, 1.2, 1.3, 1.5)}
-six = both.replace(links=[(electrical, sc.ring(6)), (chemical, sc.complete(6))], initial=None)
+six = both.replace(links=[(electrical, sc.graphs.ring(6)), (chemical, sc.graphs.complete(6))], initial=None)
 region = sc.plane(six, k=np.linspace(0, 1, 21), g=np.linspace(0, 0.3, 16), starts=1)
 
 # %%
@@ -52,7 +52,7 @@ region = sc.plane(six, k=np.linspace(0, 1, 21), g=np.linspace(0, 0.3, 16), start
 # the plane too, where each neuron receives five signals.
 from scipy.integrate import solve_ivp
 
-star, path = (np.array(graph.matrix, dtype=float) for graph in (sc.star(5), sc.chain(5)))
+star, path = (np.array(graph.matrix, dtype=float) for graph in (sc.graphs.star(5), sc.graphs.chain(5)))
 np.fill_diagonal(star, 0)
 
 

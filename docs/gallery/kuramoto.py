@@ -27,17 +27,17 @@ sine = sc.Rates({i.theta: K * W * sp.sin(j.theta - i.theta)}, {K: 1})
 scene = sc.Scene(
     phase,
     sine,
-    sc.weighted(sc.complete(n), f"1/{n}"),
+    sc.graphs.weighted(sc.graphs.complete(n), f"1/{n}"),
     initial={"theta": {"low": 0, "high": 6.283, "seed": 1}},
     record=(),
-    observe={"r": sc.mean(abs(sc.nodes.mean(sp.exp(sp.I * theta))))},
+    observe={"r": sc.observe.mean(abs(sc.observe.nodes.mean(sp.exp(sp.I * theta))))},
     transient=20,
     window=20,
     time_unit="time",
     integrator="dop853",
     rtol=1e-5,
 )
-draws = {"omega": sc.lorentzian(0, gamma)}
+draws = {"omega": sc.draw.lorentzian(0, gamma)}
 result = sc.run(scene, K=[0.5, 1, 1.5, 2, 3, 4], realisations=realisations, draws=draws, rng=1)
 
 # %%

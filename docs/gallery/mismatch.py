@@ -22,7 +22,7 @@ node = sc.Field({x: v, v: (1 + s * d) * (1 - x**2) * v - x}, parameters={s: 0, d
 scene = sc.Scene(
     node,
     "x->v",
-    sc.ring(n),
+    sc.graphs.ring(n),
     parameters={"sigma": 0.5},
     initial={"x": [2, 1.9, 1.8, 2.1, 2.2], "v": 0},
     record=("sync_error",),
@@ -32,7 +32,7 @@ scene = sc.Scene(
     rtol=1e-10,
 )
 sizes = np.geomspace(1e-4, 1e-2, 5)
-result = sc.run(scene, s=sizes, realisations=20, draws={"d": sc.normal(0, 1)}, rng=7)
+result = sc.run(scene, s=sizes, realisations=20, draws={"d": sc.draw.normal(0, 1)}, rng=7)
 
 # %%
 # Check

@@ -28,7 +28,8 @@ def functions(rates, alpha, links):
     i, j, W = sc.ends(node)
     h = {pair: symbols(f"h_{pair}") for pair in pairs}
     act = {getattr(i, b): sigma * W * sum(h[a + b] * (getattr(j, a) - getattr(i, a)) for a in "xyz") for b in "xyz"}
-    scene = sc.Scene(node, sc.Rates(act, {sigma: 1, **dict.fromkeys(h.values(), 0)}), sc.chain(2), time_unit="time")
+    coupling = sc.Rates(act, {sigma: 1, **dict.fromkeys(h.values(), 0)})
+    scene = sc.Scene(node, coupling, sc.graphs.chain(2), time_unit="time")
     options = {"starts": 1, "periods": 3000, "precision": 5e-3}
     return {link: sc.msf(scene, alpha, **{f"h_{pair}": 1 for pair in link.split()}, **options) for link in links}
 

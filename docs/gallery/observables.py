@@ -29,16 +29,16 @@ rotor = sc.Lagrangian(v**2 / 2, -P * theta, R=D * v**2 / 2, parameters={P: 0, D:
 i, j, W = sc.ends(rotor)
 link = sc.Potential(-K / n * W * cos(i.theta - j.theta), {K: 1})
 observe = {
-    "r": sc.mean(abs(sc.nodes.mean(exp(I * theta)))),
-    "frequency": sc.mean(sc.rate(theta)),
-    "spread": sc.mean(sc.nodes.std(v)),
-    "energy": sc.maximum(sc.nodes.sum(v**2 / 2)),
+    "r": sc.observe.mean(abs(sc.observe.nodes.mean(exp(I * theta)))),
+    "frequency": sc.observe.mean(sc.observe.rate(theta)),
+    "spread": sc.observe.mean(sc.observe.nodes.std(v)),
+    "energy": sc.observe.maximum(sc.observe.nodes.sum(v**2 / 2)),
 }
-lap = sc.Section(sin((sc.nodes[n](theta) - sc.nodes[1](theta)) / 2), "both", keep=(v,))
+lap = sc.Section(sin((sc.observe.nodes[n](theta) - sc.observe.nodes[1](theta)) / 2), "both", keep=(v,))
 times = {"time_unit": "time", "transient": 50, "window": 100, "rtol": 1e-11}
 start = {"theta": np.linspace(0, 3, n).tolist(), "v": 0}
 watched = {"observe": observe, "sections": {"lap": lap}, "record": ()}
-scene = sc.Scene(rotor, link, sc.complete(n), parameters={"P": powers}, initial=start, **times, **watched)
+scene = sc.Scene(rotor, link, sc.graphs.complete(n), parameters={"P": powers}, initial=start, **times, **watched)
 result = sc.run(scene, K=np.linspace(0.1, 3, 30))
 
 # %%

@@ -14,7 +14,7 @@ import numpy as np
 
 import synchain as sc
 
-network = sc.small_world(24, p="1/5", seed=1)
+network = sc.graphs.small_world(24, p="1/5", seed=1)
 start = {"x": {"low": -1, "high": 1}, "y": {"low": -0.5, "high": 0.5}}
 settings = {"transient": 0, "window": 120, "time_unit": "time", "record": ["trajectory"], "initial": start}
 scene = sc.Scene("fitzhugh_nagumo", "x->x", network, **settings)

@@ -36,7 +36,7 @@ settings = {
     "integrator": "cash_karp",
 }
 parameters = {"m": list(range(1, 8))}
-scene = sc.Scene(star, gravity, sc.complete(7), parameters=parameters, initial=initial, rtol=1e-11, **settings)
+scene = sc.Scene(star, gravity, sc.graphs.complete(7), parameters=parameters, initial=initial, rtol=1e-11, **settings)
 result = sc.run(scene)
 
 # %%

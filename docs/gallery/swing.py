@@ -37,7 +37,7 @@ i, j, W = sc.ends(bus)
 line = sc.Potential(-Symbol("b") * W * cos(i.theta - j.theta), {"b": 1})
 settings = {"transient": 0, "window": 60, "time_unit": "time", "record": ("trajectory",), "samples": 1201}
 start = {"theta": 0, "rate": 0}
-scene = sc.Scene(bus, line, sc.from_edges(edges), parameters={"P": power.tolist()}, initial=start, **settings)
+scene = sc.Scene(bus, line, sc.graphs.from_edges(edges), parameters={"P": power.tolist()}, initial=start, **settings)
 result = sc.run(scene)
 
 # %%

@@ -40,8 +40,8 @@ except ValueError as error:
 # A scene connects nodes by a link and a graph.  The program derives the equations of motion and
 # simulates exactly these.
 start = {"x": [1.2, 0.8, 0.4, 0.0]}
-scene = sc.Scene(node, "spring", sc.ring(4), initial=start, record=("sync_error", "trajectory"), samples=801)
-print(sc.text(scene.equations))
+scene = sc.Scene(node, "spring", sc.graphs.ring(4), initial=start, record=("sync_error", "trajectory"), samples=801)
+print(sc.export.text(scene.equations))
 print("parameters:", scene.parameters)
 
 # %%

@@ -19,8 +19,8 @@ The question is that of Marszal, Saha, Jankowski & Stefański, *Eur. Phys. J. Sp
 # friction oscillator, springs, the published parameters.
 import synchain as sc
 
-scene = sc.Scene(topology=sc.chain(4), parameters={"omega": 1.15}, record=("sync_error",))
-print(sc.text(scene.equations))
+scene = sc.Scene(topology=sc.graphs.chain(4), parameters={"omega": 1.15}, record=("sync_error",))
+print(sc.export.text(scene.equations))
 
 # %%
 # The spectrum

@@ -14,14 +14,14 @@ fit into it (Pecora & Carroll, *Phys. Rev. Lett.* 80, 2109 (1998)).
 # networkx.  Weights are exact, and so is the spectrum.
 import synchain as sc
 
-friends = sc.from_edges([(0, 1), (1, 2), (2, 0), (2, 3), (3, 4), (4, 5), (5, 3)])
+friends = sc.graphs.from_edges([(0, 1), (1, 2), (2, 0), (2, 3), (3, 4), (4, 5), (5, 3)])
 print(friends.spectrum)
 
 # %%
 # Two triangles joined by a bridge have the eigenvalues of a graph with that much symmetry; other
 # graphs have algebraic numbers, which are exact too and evaluate to any number of digits.
-print(sc.star(6).spectrum)
-print(sc.cartesian(sc.ring(5), sc.chain(3)).spectrum.largest)
+print(sc.graphs.star(6).spectrum)
+print(sc.graphs.cartesian(sc.graphs.ring(5), sc.graphs.chain(3)).spectrum.largest)
 
 # %%
 # The oscillator
@@ -36,7 +36,12 @@ print(f"modes decay for α from {low:.2f} to {high:.2f}: a factor of {high / low
 
 # %%
 # A graph can synchronise if the ratio of its largest to its smallest non-zero eigenvalue is less.
-graphs = {"two triangles": friends, "chain(12)": sc.chain(12), "star(12)": sc.star(12), "ring(12)": sc.ring(12)}
+graphs = {
+    "two triangles": friends,
+    "chain(12)": sc.graphs.chain(12),
+    "star(12)": sc.graphs.star(12),
+    "ring(12)": sc.graphs.ring(12),
+}
 for name, graph in graphs.items():
     found = sc.msf(scene.replace(topology=graph), function.alpha, starts=2, periods=400, precision=5e-3).windows
     words = f"σ from {found[0].low:.3f} to {found[0].high:.3f}" if found else "never"

@@ -118,7 +118,7 @@ def Lagrangian(
     --------
     >>> import sympy as sp
     >>> from sympy.physics.mechanics import dynamicsymbols
-    >>> from synchain.models import Lagrangian
+    >>> from synchain import Lagrangian
     >>> x, t = dynamicsymbols("x"), dynamicsymbols._t
     >>> v, mu, u, omega = x.diff(t), *sp.symbols("mu u omega")
     >>> node = Lagrangian(v**2/2, x**2/2, {x: mu*(1 - x**2)*v + u*sp.cos(omega*t)},
@@ -204,7 +204,7 @@ def Field(
     Examples
     --------
     >>> import sympy as sp
-    >>> from synchain.models import Field
+    >>> from synchain import Field
     >>> x, y, c = sp.symbols("x y c")
     >>> node = Field({x: c*(y + x - x**3/3), y: -(x - 0.7 + 0.8*y)/c}, parameters={c: 3})
     >>> node.y
@@ -273,7 +273,7 @@ def friction_law(
 
     Examples
     --------
-    >>> from synchain.models import friction_law
+    >>> from synchain import friction_law
     >>> friction_law("mu*sign(w)/(1 + abs(w))", {"mu": 0.3}).jumps
     True
     """
@@ -341,7 +341,7 @@ def link_energy(
 
     Examples
     --------
-    >>> from synchain.models import link_energy
+    >>> from synchain import link_energy
     >>> spring = link_energy("k*W*(q_i - q_j)**2/2", parameters={"k": 0.3})
     >>> str(spring.potential)
     'k*weight*(q_i - q_j)**2/2'

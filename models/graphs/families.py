@@ -125,7 +125,7 @@ class Family:
 
     Examples
     --------
-    >>> from synchain.models import Family
+    >>> from synchain.plugins import Family
     >>> pairs = Family(lambda n: ((i, i + 1, 1) for i in range(0, n - 1, 2)), minimum=2, connected=False, name="pairs")
     >>> pairs(4).link_count
     4

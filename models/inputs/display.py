@@ -101,7 +101,7 @@ class HasAnimation(HasPlot):
         Examples
         --------
         >>> import synchain as sc
-        >>> scene = sc.Scene("friction", "spring", sc.chain(3), record=["trajectory"], contact="set-valued", window=4)
+        >>> scene = sc.Scene("friction", "spring", sc.graphs.chain(3), record=["trajectory"], contact="set-valued", window=4)
         >>> motion = sc.run(scene, sigma=0.1).animate(seconds=2)
         >>> motion.save("motion.gif")  # doctest: +SKIP
         """
@@ -135,7 +135,7 @@ class HasDrawing(HasHtml):
         Examples
         --------
         >>> import synchain as sc
-        >>> axes = sc.ring(6).draw(values=[0, 1, 2, 0, 1, 2])
+        >>> axes = sc.graphs.ring(6).draw(values=[0, 1, 2, 0, 1, 2])
         """
         from synchain.runtime.plots.graph_picture import draw_graph
 

@@ -52,7 +52,7 @@ def exprel(x: sp.Expr | float) -> sp.Expr:
     Examples
     --------
     >>> import sympy as sp
-    >>> from synchain.models import Field, exprel
+    >>> from synchain import Field, exprel
     >>> V = sp.Symbol("V")
     >>> Field({V: 1/exprel(-V) - V}) == Field({"V": "1/exprel(-V) - V"})
     True

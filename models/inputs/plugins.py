@@ -220,7 +220,7 @@ def _text(kind: PluginKind, name: str, path: Path) -> bytes:
     if path not in _allowed:
         raise ValueError(
             f"{kind.name} {name!r} is a file of code, which is not run unasked; read it, then allow it: "
-            f"synchain.models.inputs.plugins.allow_code({name!r}), or --allow-code where a command has it"
+            f"synchain.plugins.allow_code({name!r}), or --allow-code where a command has it"
         )
     try:
         return path.read_bytes()

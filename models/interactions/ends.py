@@ -62,7 +62,7 @@ def ends(node: Oscillator, source: Oscillator | None = None) -> tuple[End, End, 
 
     Examples
     --------
-    >>> from synchain.models import ends
+    >>> from synchain import ends
     >>> from synchain.models.definitions.loader import load_oscillator
     >>> i, j, W = ends(load_oscillator("harmonic"))
     >>> W * (j.x - i.x)

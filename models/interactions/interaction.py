@@ -58,7 +58,7 @@ class Rates:
     Examples
     --------
     >>> import sympy as sp
-    >>> from synchain.models import Rates, ends
+    >>> from synchain import Rates, ends
     >>> from synchain.models.definitions.loader import load_oscillator
     >>> i, j, W = ends(load_oscillator("rossler"))
     >>> K = sp.Symbol("K")

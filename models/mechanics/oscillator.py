@@ -32,7 +32,7 @@ def friction(velocity: sp.Expr) -> sp.Expr:
     Examples
     --------
     >>> import sympy as sp
-    >>> from synchain.models import friction
+    >>> from synchain import friction
     >>> N, belt, v = sp.symbols("N belt v")
     >>> N * friction(belt - v)
     N*f(belt - v)

@@ -138,7 +138,8 @@ class Scene(HasDrawing, HasLatex):
 
     Examples
     --------
-    >>> from synchain import Scene, chain
+    >>> from synchain import Scene
+    >>> from synchain.graphs import chain
     >>> scene = Scene("van_der_pol", "spring", chain(3), parameters={"mu": 1.5}, axes={"sigma": [0.1, 0.2]})
     >>> scene.n, scene.cells, scene.components
     (3, 2, ('x', 'v'))

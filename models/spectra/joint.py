@@ -116,7 +116,7 @@ def joint_spectrum(graphs: Sequence[Matrix]) -> tuple[JointEigenvalue, ...]:
 
     Examples
     --------
-    >>> from synchain.models import complete, joint_spectrum, ring
+    >>> from synchain.graphs import complete, joint_spectrum, ring
     >>> [str(mode) for mode in joint_spectrum((ring(4), complete(4)))]
     ['(0, 0)', '(-2, -4)', '(-4, -4)']
     """

@@ -28,7 +28,7 @@ class Continuation(Word):
 
 
 CELL_LIMIT = 10**9
-"""Most cells of a sweep, a choice; large results go to a file, block by block (`synchain.runtime.stream`)."""
+"""Most cells of a sweep, a choice; large results go to a file, block by block (`synchain.stream`)."""
 
 SAMPLE_LIMIT = 10**9
 """Most numbers in the trajectories of all cells, 8 GB."""

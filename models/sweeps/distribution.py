@@ -35,7 +35,7 @@ class Draw:
 
     Examples
     --------
-    >>> from synchain import normal, uniform
+    >>> from synchain.draw import normal, uniform
     >>> print(normal(0, 1), uniform(-1, 1))
     normal(0.0, 1.0) uniform(-1.0, 1.0)
     """

@@ -115,7 +115,7 @@ def orbital_partitions(
 
     Examples
     --------
-    >>> from synchain.models import orbital_partitions, ring, star
+    >>> from synchain.graphs import orbital_partitions, ring, star
     >>> [state.classes for state in orbital_partitions([ring(4), star(4)])]
     [(0, 1, 2, 3), (0, 1, 2, 1)]
     """
@@ -166,7 +166,7 @@ def clusters(graph: Graphs, classes: Sequence[int]) -> Clusters:
     --------
     Two layers that do not commute: the differences of all nodes separate into blocks of one and two.
 
-    >>> from synchain.models import clusters, ring, star
+    >>> from synchain.graphs import clusters, ring, star
     >>> [(len(block.cluster_of), block.multiplicity) for block in clusters([ring(4), star(4)], [0] * 4).blocks]
     [(2, 1), (1, 1)]
     """

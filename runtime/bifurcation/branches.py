@@ -100,7 +100,8 @@ def follow(
     --------
     Two machines of a power grid: beyond P/K = 1 there is no equilibrium.
 
-    >>> from synchain import Field, Rates, Scene, chain, equilibrium, follow
+    >>> from synchain import Field, Rates, Scene, equilibrium, follow
+    >>> from synchain.graphs import chain
     >>> machine = Field({"delta": "w", "w": "P - w/2"}, parameters={"P": 0})
     >>> line = Rates({"w": "K*W*sin(delta_j - delta_i)"}, {"K": 1})
     >>> rest = equilibrium(Scene(machine, line, chain(2), parameters={"P": [0.5, -0.5]}))

@@ -262,7 +262,8 @@ def equilibrium(
     --------
     Two machines of a power grid: sin(delta) = P/K.
 
-    >>> from synchain import Field, Rates, Scene, chain, equilibrium
+    >>> from synchain import Field, Rates, Scene, equilibrium
+    >>> from synchain.graphs import chain
     >>> machine = Field({"delta": "w", "w": "P - w/2"}, parameters={"P": 0})
     >>> line = Rates({"w": "K*W*sin(delta_j - delta_i)"}, {"K": 1})
     >>> rest = equilibrium(Scene(machine, line, chain(2), parameters={"P": [0.5, -0.5]}))

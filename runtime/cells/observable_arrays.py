@@ -13,7 +13,7 @@ from synchain.codegen.driver.columns import SumColumn, Tally
 from synchain.codegen.kernels.observable_functions import Recording, with_rows
 from synchain.models.dynamics.observable import ENERGY, ObservedWindow
 from synchain.models.dynamics.observable_text import as_value
-from synchain.models.scenes.energy import energy as exact_energy
+from synchain.models.scenes.energy import energy_terms as exact_energy
 from synchain.models.scenes.observables import has_own_energy
 from synchain.models.scenes.scene import Scene, Section
 

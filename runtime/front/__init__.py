@@ -1,33 +1,75 @@
-"""The package `synchain`: all names of its models and of its runtime, each loaded when it is first used.
+"""From a Lagrangian and a graph to exact equations, exact spectra, fast simulation and stability.
 
-``import synchain`` is this file, which imports the two packages and none of their rooms; editors read the names in
-`__init__.pyi`.
+    Lagrangian, Field, friction_law                  one node
+    link_energy, Potential, Rates, ends              one link
+    graphs                                           a graph; `topology.spectrum` holds its exact eigenvalues
+    Scene, load_scene, Axis, Section                 a network with its numbers, starts and records
+    run, stream, merge, kernel                       trajectories and records of all cells of a scene
+    msf, plane, exponents, cluster_exponents,
+    lyapunov_spectrum                                stability of synchronous, clustered and other motion
+    thresholds, transition, universal_probe, basin   strengths and starts that synchronise
+    equilibrium, periodic_orbit, follow, skeleton    states at rest, orbits, their branches and bifurcations
+
+The modules `graphs`, `observe`, `draw`, `export`, `plugins` and `results` hold the other names.  Each name is loaded
+when it is first used; editors read the names in the stubs beside this file.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from synchain import models, runtime
+from .offers import offer
+
+MODULES = ("draw", "export", "graphs", "observe", "plugins", "results")
+
+HOMES = {
+    **dict.fromkeys(MODULES, ""),
+    "Axis": "models.sweeps.axis",
+    "Criterion": "runtime.synchronisation.criterion",
+    "Field": "models.definitions.inline",
+    "Lagrangian": "models.definitions.inline",
+    "Parameter": "models.mechanics.parameter",
+    "Potential": "models.interactions.interaction",
+    "Rates": "models.interactions.interaction",
+    "Scene": "models.scenes.scene",
+    "Section": "models.scenes.section",
+    "basin": "runtime.synchronisation.basin",
+    "cluster_exponents": "runtime.stability.cluster_exponents",
+    "ends": "models.interactions.ends",
+    "energy_terms": "models.scenes.energy",
+    "energy_function": "runtime.results.energy_of_states",
+    "equilibrium": "runtime.bifurcation.equilibrium",
+    "exponents": "runtime.stability.exponents",
+    "exprel": "models.inputs.expression_text",
+    "follow": "runtime.bifurcation.branches",
+    "friction": "models.mechanics.oscillator",
+    "friction_law": "models.definitions.inline",
+    "kernel": "runtime.engines.scene_kernels",
+    "link_energy": "models.definitions.inline",
+    "load_oscillator": "models.definitions.loader",
+    "load_scene": "models.scenes.file",
+    "lyapunov_spectrum": "runtime.stability.lyapunov",
+    "merge": "runtime.sweeps.merge",
+    "msf": "runtime.stability.msf",
+    "open_result": "runtime.results.open",
+    "periodic_orbit": "runtime.bifurcation.periodic",
+    "plane": "runtime.stability.msf",
+    "run": "runtime.sweeps.run",
+    "scene_names": "models.scenes.file",
+    "skeleton": "runtime.bifurcation.skeleton",
+    "stream": "runtime.sweeps.stream",
+    "thresholds": "runtime.synchronisation.threshold",
+    "transition": "runtime.synchronisation.transition",
+    "universal_probe": "runtime.synchronisation.probe",
+}
+
+__all__ = list(HOMES)
+_load, __dir__ = offer(__name__, HOMES)
 
 
 def __getattr__(name: str) -> Any:
-    if name == "__all__":
-        value: Any = [public for public in __dir__() if not public.startswith("__")]
-    elif name == "__version__":
-        from importlib.metadata import version
+    if name != "__version__":
+        return _load(name)
+    from importlib.metadata import version
 
-        value = version("synchain")
-    else:
-        home = next((package for package in (runtime, models) if name in dir(package)), None)
-        if home is None or name.startswith("_"):
-            raise AttributeError(f"module 'synchain' has no attribute {name!r}")
-        value = getattr(home, name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    dunders = {name for name in globals() if name.startswith("__")}
-    of_models = (name for name in dir(models) if not name.startswith("_"))
-    return sorted({*dunders, "__version__", "models", "runtime", *runtime.__all__, *of_models})
+    return version("synchain")

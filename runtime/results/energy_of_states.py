@@ -13,7 +13,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.checks import check_keys, check_number, check_table
 from synchain.models.mechanics.components import TIME
 from synchain.models.networks.energy_terms import EnergyTerms, Share
-from synchain.models.scenes.energy import energy
+from synchain.models.scenes.energy import energy_terms
 from synchain.models.scenes.scene import Scene, check_scene
 
 from ..support.arrays import numbers
@@ -93,7 +93,7 @@ def energy_function(scene: Scene) -> EnergyFunction:
     """Return the compiled energy of a scene's network; raise ValueError as
     `synchain.models.scenes.energy.energy` does.
     """
-    exact = energy(check_scene(scene))
+    exact = energy_terms(check_scene(scene))
     equations, places = exact.equations, exact.equations.places  # places[i]: indices of the states of node i
     groups = []
     for kind, (share, node) in enumerate(zip(exact.nodes, equations.nodes, strict=True)):

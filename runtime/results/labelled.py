@@ -28,7 +28,7 @@ class Labelled(HasPlot):
 
     A subclass is a frozen dataclass that defines `data` and `summary`.  `synchain.runtime.results.codec` writes and
     reads the fields by their types, so a subclass needs no reader or writer.  `open_result` finds a subclass by its
-    public name in `synchain.runtime`.
+    name in `synchain.results`.
     """
 
     __slots__ = ()

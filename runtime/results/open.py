@@ -67,8 +67,8 @@ def open_result(path: str | os.PathLike[str]) -> Labelled:
 
 
 def _class_of(kind: str) -> type[Labelled]:
-    """Return the result class of a public name of `synchain.runtime`, which imports the module on first use."""
-    found = getattr(import_module("synchain.runtime"), kind, None)
+    """Return the result class of a name in `synchain.results`, which imports the module on first use."""
+    found = getattr(import_module("synchain.results"), kind, None)
     if not isinstance(found, type) or not issubclass(found, Labelled):
         raise ValueError(f"it holds a {kind}; expected a result")
     return found

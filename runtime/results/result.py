@@ -83,7 +83,7 @@ class Result(_Deferred, HasAnimation, Labelled):
 
     Notes
     -----
-    Every cell has a `status`; `synchain.runtime.Status` names the codes.  Times are non-dimensional.
+    Every cell has a `status`; `synchain.results.Status` names the codes.  Times are non-dimensional.
 
     References
     ----------
@@ -92,11 +92,11 @@ class Result(_Deferred, HasAnimation, Labelled):
     Examples
     --------
     >>> import synchain as sc
-    >>> scene = sc.Scene("van_der_pol", "x->v", sc.ring(4), transient=5, window=10)
+    >>> scene = sc.Scene("van_der_pol", "x->v", sc.graphs.ring(4), transient=5, window=10)
     >>> result = sc.run(scene, sigma=[0.0, 0.5, 1.0], show_progress=False)
     >>> result["sync_error"].dims
     ('sigma',)
-    >>> result.sel(sigma=0.4, method="nearest").status.item() == sc.Status.FINISHED
+    >>> result.sel(sigma=0.4, method="nearest").status.item() == sc.results.Status.FINISHED
     True
     >>> result["status"].attrs["flag_meanings"].split()[:2]
     ['not_run', 'finished']
@@ -180,7 +180,7 @@ class Result(_Deferred, HasAnimation, Labelled):
         Examples
         --------
         >>> import synchain as sc
-        >>> scene = sc.Scene("van_der_pol", "x->v", sc.ring(4), transient=0, window=1)
+        >>> scene = sc.Scene("van_der_pol", "x->v", sc.graphs.ring(4), transient=0, window=1)
         >>> result = sc.run(scene, sigma=[0.0, 0.5], show_progress=False)
         >>> result.sel(sigma=0.5, component="x").end.shape
         (4,)
@@ -213,7 +213,7 @@ class Result(_Deferred, HasAnimation, Labelled):
         Examples
         --------
         >>> import synchain as sc
-        >>> scene = sc.Scene("van_der_pol", "x->v", sc.ring(4), transient=0, window=1)
+        >>> scene = sc.Scene("van_der_pol", "x->v", sc.graphs.ring(4), transient=0, window=1)
         >>> result = sc.run(scene, sigma=[0.0, 0.5], show_progress=False)
         >>> result.isel(sigma=-1).sigma.item()
         0.5
@@ -234,7 +234,7 @@ class Result(_Deferred, HasAnimation, Labelled):
         Examples
         --------
         >>> import synchain as sc
-        >>> scene = sc.Scene("van_der_pol", "x->v", sc.ring(4), transient=0, window=1)
+        >>> scene = sc.Scene("van_der_pol", "x->v", sc.graphs.ring(4), transient=0, window=1)
         >>> sc.run(scene, sigma=[0.0, 0.5], show_progress=False).to_xarray().sizes["sigma"]
         2
         """
@@ -265,7 +265,7 @@ class Result(_Deferred, HasAnimation, Labelled):
         Examples
         --------
         >>> import synchain as sc
-        >>> scene = sc.Scene("van_der_pol", "x->v", sc.ring(4), transient=0, window=1)
+        >>> scene = sc.Scene("van_der_pol", "x->v", sc.graphs.ring(4), transient=0, window=1)
         >>> result = sc.run(scene, sigma=[0.0, 0.5], show_progress=False)
         >>> result.to_dataframe()["status"].tolist()
         [1, 1]
@@ -367,7 +367,7 @@ class Result(_Deferred, HasAnimation, Labelled):
         Examples
         --------
         >>> import synchain as sc
-        >>> scene = sc.Scene("van_der_pol", "x->v", sc.ring(4), record=["trajectory"], transient=0, window=20)
+        >>> scene = sc.Scene("van_der_pol", "x->v", sc.graphs.ring(4), record=["trajectory"], transient=0, window=20)
         >>> axes = sc.run(scene, sigma=0.5).plot(kind="time")
         """
         return HasPlot.plot(self, ax, kind=kind, windows=windows, **style)

@@ -288,7 +288,7 @@ class MSF(Labelled):
         Examples
         --------
         >>> import synchain as sc
-        >>> function = sc.msf(sc.Scene("duffing", "spring", sc.chain(4)), [0, 0.1, 0.2], periods=50)
+        >>> function = sc.msf(sc.Scene("duffing", "spring", sc.graphs.chain(4)), [0, 0.1, 0.2], periods=50)
         >>> axes = function.plot(sigma=0.05)
         """
         axes: Axes = HasPlot.plot(self, ax, sigma=sigma, **style)
@@ -546,7 +546,7 @@ def msf(
     Examples
     --------
     >>> import synchain as sc
-    >>> function = sc.msf(sc.Scene("duffing", "spring", sc.chain(4), parameters={"sigma": 0.1}), periods=50)
+    >>> function = sc.msf(sc.Scene("duffing", "spring", sc.graphs.chain(4), parameters={"sigma": 0.1}), periods=50)
     >>> float(function.alpha[0]), round(float(function.alpha[-1]), 10)
     (0.0, 0.69)
     """

@@ -63,8 +63,8 @@ def merge(
     Examples
     --------
     >>> import tempfile
-    >>> from synchain.models import Scene, chain
-    >>> from synchain.runtime import merge, stream
+    >>> from synchain import Scene, merge, stream
+    >>> from synchain.graphs import chain
     >>> scene = Scene(topology=chain(2), transient=1, window=1, axes={"sigma": [0.0, 0.1, 0.2]})
     >>> folder = tempfile.mkdtemp()
     >>> done = [stream(scene, f"{folder}/map.nc", part=(k, 2), show_progress=False) for k in (1, 2)]

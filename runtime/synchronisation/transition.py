@@ -237,7 +237,7 @@ class Transition(Labelled):
         --------
         >>> import synchain as sc
         >>> node = sc.Field({"x": "10*(y - x)", "y": "x*(28 - z) - y", "z": "x*y - 2*z"}, initial={"x": 1})
-        >>> scene = sc.Scene(node, "x->x", sc.chain(2), parameters={"sigma": 5})
+        >>> scene = sc.Scene(node, "x->x", sc.graphs.chain(2), parameters={"sigma": 5})
         >>> sc.transition(scene, periods=200).verify(0.2, periods=200).verdicts
         ('confirmed',)
         """
@@ -435,7 +435,7 @@ def transition(
     --------
     >>> import synchain as sc
     >>> node = sc.Field({"x": "10*(y - x)", "y": "x*(28 - z) - y", "z": "x*y - 2*z"}, initial={"x": 1})
-    >>> diamond = sc.from_edges([(1, 2), (1, 3), (2, 3), (2, 4), (3, 4)])
+    >>> diamond = sc.graphs.from_edges([(1, 2), (1, 3), (2, 3), (2, 4), (3, 4)])
     >>> sequence = sc.transition(sc.Scene(node, "x->x", diamond, parameters={"sigma": 4}), periods=200)
     >>> [step.clusters for step in sequence.steps]
     [((1, 2),), ((0, 1, 2, 3),)]

@@ -10,12 +10,12 @@ import pytest
 import benchmarks
 from benchmarks.energy import CASES, COLUMNS, INTEGRATORS, Case, drift, measure_long
 from benchmarks.energy import measure as measure_energy
-from synchain.models.scenes.energy import energy
+from synchain.models.scenes.energy import energy_terms
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_every_case_is_conservative_and_moves(case: Case) -> None:
-    exact = energy(case.scene)
+    exact = energy_terms(case.scene)
     (node,) = exact.nodes
     zero = {s: 0 for s in node.power.free_symbols if case.scene.parameters.get(s.name) == 0.0}
     assert node.power.xreplace(zero) == 0

@@ -10,7 +10,8 @@ from types import SimpleNamespace
 import pytest
 
 from benchmarks import families
-from synchain.models import Scene, topology
+from synchain import Scene
+from synchain.graphs import topology
 from synchain.runtime.prediction.synchronisability import verdict
 
 pytestmark = pytest.mark.long

@@ -14,7 +14,8 @@ import pytest
 
 from benchmarks import msf
 from benchmarks.peers import PEERS, jitcode_transversal
-from synchain.models import Scene, topology
+from synchain import Scene
+from synchain.graphs import topology
 from synchain.runtime.stability import march
 
 ABSENT = replace(PEERS[msf.PEER], modules=("a_peer_that_nobody_has",))

@@ -12,8 +12,9 @@ from samples import source_of
 
 from benchmarks import roofline, skip
 from benchmarks.kit.operations import PRIMITIVE, Counter, operations
+from synchain import Scene
 from synchain.codegen.simd import elementary, lanes
-from synchain.models import Scene, chain, ring
+from synchain.graphs import chain, ring
 from synchain.runtime.engines.scene_kernels import kernel_source
 
 TEXT = """

@@ -12,9 +12,10 @@ from family_sizes import size
 from benchmarks import stability
 from benchmarks.kit.stability_cases import Case, cases
 from benchmarks.kit.stability_reference import end_state
-from synchain.models import Scene, topology
+from synchain import Scene, exponents, run
+from synchain.graphs import topology
 from synchain.models.graphs.families import names
-from synchain.runtime import Status, exponents, run
+from synchain.results import Status
 
 QUICK = list(cases(quick=True))
 STATUS, ALLOWED, ENERGY, VERDICT = (

@@ -14,8 +14,8 @@ import numpy as np
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from synchain.models import Field, Scene
-from synchain.runtime import Status, run
+from synchain import Field, Scene, run
+from synchain.results import Status
 
 PERIODS = 2.0
 """Length of a comparison in periods of the flow, if the Lyapunov time is not shorter."""

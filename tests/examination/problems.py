@@ -17,7 +17,8 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 import synchain as sc
-from synchain.runtime import Status, run
+from synchain import run
+from synchain.results import Status
 
 
 @dataclass(frozen=True)
@@ -235,7 +236,7 @@ def _brusselator() -> sc.Scene:
     x = np.arange(1, n + 1) / (n + 1)
     ends = [1.0, *[0.0] * (n - 2), 1.0]
     start = {"u": (1 + np.sin(2 * np.pi * x)).tolist(), "v": [3.0] * n}
-    return sc.Scene(node, links, sc.chain(n), parameters={"e": ends}, initial=start)
+    return sc.Scene(node, links, sc.graphs.chain(n), parameters={"e": ends}, initial=start)
 
 
 def _cusp() -> sc.Scene:
@@ -250,7 +251,7 @@ def _cusp() -> sc.Scene:
     links = sc.Rates({z: f"D*W*({z}_j - {z}_i)" for z in "yab"}, {"D": n**2 / 144})
     angle = 2 * np.pi * np.arange(1, n + 1) / n
     start = {"y": [0.0] * n, "a": (-2 * np.cos(angle)).tolist(), "b": (2 * np.sin(angle)).tolist()}
-    return sc.Scene(sc.Field(rates), links, sc.ring(n), initial=start)
+    return sc.Scene(sc.Field(rates), links, sc.graphs.ring(n), initial=start)
 
 
 def _fitzhugh_nagumo() -> sc.Scene:
@@ -268,7 +269,7 @@ def _fitzhugh_nagumo() -> sc.Scene:
     )
     angle = 2 * np.pi * np.arange(n) / n
     start = {"u": (1.5 * np.cos(3 * angle)).tolist(), "v": (0.6 * np.sin(angle)).tolist()}
-    return sc.Scene(node, links, sc.topology("circulant", n, offsets=tuple(range(1, reach + 1))), initial=start)
+    return sc.Scene(node, links, sc.graphs.topology("circulant", n, offsets=tuple(range(1, reach + 1))), initial=start)
 
 
 def rates_of(scene: sc.Scene) -> tuple[Callable[[float, np.ndarray], np.ndarray], np.ndarray]:

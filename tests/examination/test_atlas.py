@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from networkx.generators.atlas import graph_atlas, graph_atlas_g
 
-from synchain import from_graph
+from synchain.graphs import from_graph
 
 GRAPHS = 209
 """Number of graphs with at most six nodes, the empty one included."""

@@ -99,10 +99,10 @@ def _strength(scene: sc.Scene) -> dict[str, float]:
     return {"g": scene.parameters["g"]} if scene.n > 1 else {}
 
 
-def laplacian(weights: Sequence[Sequence[float]] | np.ndarray) -> sc.Topology:
+def laplacian(weights: Sequence[Sequence[float]] | np.ndarray) -> sc.graphs.Topology:
     """The graph of whole weights: off the diagonal, row by row."""
     matrix = np.asarray(weights).astype(int)
-    return sc.from_matrix((matrix - np.diag(matrix.sum(axis=1))).tolist())
+    return sc.graphs.from_matrix((matrix - np.diag(matrix.sum(axis=1))).tolist())
 
 
 def of_order(scene: sc.Scene, order: Sequence[int]) -> sc.Scene:

@@ -74,7 +74,7 @@ def pair(
     return sc.Scene(
         node,
         PULL,
-        sc.chain(2),
+        sc.graphs.chain(2),
         parameters={**units.parameters, "g": 0.2 * units.k},
         initial=units.put(x, v),
         transient=0.0,
@@ -187,7 +187,7 @@ def of_orbit(units: Units, change: Change, path: Path) -> Answer:
     return {"period": np.array(orbit.period * units.k), "multipliers": np.sort(np.abs(orbit.multipliers))}
 
 
-def _orbit_of_drive(units: Units, change: Change) -> tuple[sc.Scene, sc.PeriodicOrbit]:
+def _orbit_of_drive(units: Units, change: Change) -> tuple[sc.Scene, sc.results.PeriodicOrbit]:
     scene = change(driven(units))
     return scene, sc.periodic_orbit(scene)
 

@@ -13,12 +13,12 @@ from questions import CYCLE, PULL
 
 import synchain as sc
 
-SCENE = sc.Scene(CYCLE, PULL, sc.chain(3), initial={"x": [0.1, 0.2, 0.3], "v": 0.0}, window=5.0, transient=1.0)
+SCENE = sc.Scene(CYCLE, PULL, sc.graphs.chain(3), initial={"x": [0.1, 0.2, 0.3], "v": 0.0}, window=5.0, transient=1.0)
 OTHER: dict[str, Any] = {
     "title": "other",
     "oscillator": "rossler",
     "coupling": "x->x",
-    "topology": sc.ring(3),
+    "topology": sc.graphs.ring(3),
     "parameters": {"g": 0.7},
     "initial": {"x": 2.0, "v": 1.0},
     "record": ("trajectory",),
@@ -62,15 +62,15 @@ def test_fields_that_need_one_another_are_put_back_together(names: tuple[str, ..
 
 @pytest.mark.parametrize("value", [5.0, {"low": 1.0, "high": 2.0, "seed": 3}])
 def test_numbers_and_ranges_of_any_number_of_nodes_stay(value: Any) -> None:
-    scene = sc.Scene("duffing", topology=sc.chain(3), initial={"x": value})
-    there = scene.replace(topology=sc.chain(4))
-    assert there == sc.Scene("duffing", topology=sc.chain(4), initial={"x": value})
-    assert there.replace(topology=sc.chain(3)) == scene
+    scene = sc.Scene("duffing", topology=sc.graphs.chain(3), initial={"x": value})
+    there = scene.replace(topology=sc.graphs.chain(4))
+    assert there == sc.Scene("duffing", topology=sc.graphs.chain(4), initial={"x": value})
+    assert there.replace(topology=sc.graphs.chain(3)) == scene
 
 
 def test_a_list_of_another_length_is_refused_in_one_line() -> None:
     with pytest.raises((ValueError, TypeError)) as caught:
-        sc.Scene(CYCLE, PULL, sc.chain(4), initial={"x": [0.1, 0.2, 0.3]})
+        sc.Scene(CYCLE, PULL, sc.graphs.chain(4), initial={"x": [0.1, 0.2, 0.3]})
     assert "\n" not in str(caught.value)
 
 

@@ -26,7 +26,7 @@ from synchain.codegen.export.portable_names import RESERVED, portable
 from synchain.codegen.export.python import to_python
 from synchain.codegen.program.lowering import Library, number
 from synchain.codegen.program.printers import C99, MATH, NUMPY, Printer
-from synchain.models import chain, ring, star
+from synchain.graphs import chain, ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.products import weighted
 from synchain.models.graphs.topology import from_matrix

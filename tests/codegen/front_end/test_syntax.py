@@ -16,12 +16,13 @@ from numba.core import errors
 from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python, rtsys
 
+from synchain import Lagrangian, Potential, Scene
 from synchain.codegen.front_end import compiler, decorator, emitter, syntax_reader, syntax_trees
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.machine_code.compile import _compile
 from synchain.codegen.simd.addresses import ADDRESS
 from synchain.codegen.simd.lane_types import Lane
-from synchain.models import Lagrangian, Potential, Scene, chain
+from synchain.graphs import chain
 
 HEAD = """import math
 import numpy as np

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from synchain import Field, Scene, run
 from synchain.codegen import integrators
-from synchain.models import Field, Scene
 from synchain.models.scenes.defaults import integrators as names_in_scenes
-from synchain.runtime import run
 
 BOGACKI_SHAMPINE = """
 KIND, ORDER, ERROR_ORDER, DENSE_ORDER = "explicit", 3, 2, 3

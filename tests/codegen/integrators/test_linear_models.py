@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from synchain import Field, Rates, Scene, run
 from synchain.codegen import integrators
 from synchain.codegen.front_end import decorator
 from synchain.codegen.machine_code.cache import cache_folder
-from synchain.models import Field, Rates, Scene, chain
-from synchain.runtime import run
+from synchain.graphs import chain
 from synchain.runtime.support.status import Status
 
 MODELS: dict[str, tuple[dict[str, str], list[list[float]], list[float]]] = {

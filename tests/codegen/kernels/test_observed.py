@@ -20,7 +20,7 @@ PLACES = (
     "{}*x", "{} + rate(x)*v", "x/(2 + {})", "(2 + v**2)**{}", "nodes.sum({}*v)", "nodes[2](x*{})", "nodes.maximum({})*rate(v_1)",
     "abs({})*v", "max({}, v)*x", "atan2({}, x)", "mod({}, 3)", "sign({})*rate(x)",
 )  # fmt: skip
-SCENE = sc.Scene("van_der_pol", "x->x", sc.chain(3))
+SCENE = sc.Scene("van_der_pol", "x->x", sc.graphs.chain(3))
 GIVEN = {
     *vars(builtins),
     *LANES.values(),

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from synchain import Scene
 from synchain.codegen.integrators import integrator
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.simd.lane_types import native_width
-from synchain.models import Scene, chain
+from synchain.graphs import chain
 
 PAIR = Scene(topology=chain(2), parameters={"kappa": 10.0}).equations
 

@@ -22,7 +22,7 @@ from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.program.lowering import UnprintableError
 from synchain.codegen.steps.safe_names import tidy
 from synchain.codegen.taylor import write_looped, write_step
-from synchain.models import chain
+from synchain.graphs import chain
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import mode
 from synchain.models.mechanics.components import Node

@@ -9,7 +9,7 @@ from samples import FLOATS, kernel, plain, run_cells
 from synchain.codegen import driver
 from synchain.codegen.steps.safe_names import NAMES
 from synchain.codegen.steps.sparse_plan import SparsePlan, order, sparse_plan
-from synchain.models import chain, complete, grid, random_cubic, ring, star, tree, wheel
+from synchain.graphs import chain, complete, grid, random_cubic, ring, star, tree, wheel
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.scenes.scene import Scene

@@ -15,7 +15,7 @@ from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.steps.places import by_joint
 from synchain.codegen.steps.sparse_plan import sparse_plan
-from synchain.models import ring, star
+from synchain.graphs import ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene

@@ -12,9 +12,10 @@ from march import Lanes, alone, compiled, step_of
 from plain import Text, march
 from samples import path, spring
 
+from synchain import Scene
 from synchain.codegen.steps.safe_names import tidy
 from synchain.codegen.taylor import taylor_obstacle, write_looped
-from synchain.models import Scene, chain
+from synchain.graphs import chain
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME as T
 from synchain.models.mechanics.components import Edge, Node

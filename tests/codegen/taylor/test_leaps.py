@@ -13,13 +13,13 @@ from plain import march
 from samples import path
 from scipy.integrate import solve_ivp
 
+from synchain import Field, Rates, Scene, run
 from synchain.codegen.steps.safe_names import tidy
 from synchain.codegen.taylor import taylor_obstacle, write_looped, write_step
-from synchain.models import Field, Rates, Scene, chain, ring
+from synchain.graphs import chain, ring
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME as T
 from synchain.models.mechanics.components import Edge, Node
-from synchain.runtime import run
 
 X, V, A, B, W = sp.symbols("x v a b w", real=True)
 BOTH = pytest.mark.parametrize("looped", [False, True], ids=["lines", "loops"])

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 from synchain.codegen.steps.safe_names import tidy
 from synchain.codegen.taylor import write_looped
-from synchain.models import chain
+from synchain.graphs import chain
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import node
 from synchain.models.inputs.frozen import FrozenDict

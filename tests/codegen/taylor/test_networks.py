@@ -11,9 +11,10 @@ from samples import TABLE, harmonic_chain, looped, parametric, tanh_pair, two_ki
 from scipy.integrate import solve_ivp
 from test_step import friction_pair, pendula
 
+from synchain import Scene
 from synchain.codegen.steps.safe_names import tidy
 from synchain.codegen.taylor import write_looped
-from synchain.models import Scene, chain, ring
+from synchain.graphs import chain, ring
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 

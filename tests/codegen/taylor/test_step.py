@@ -16,11 +16,12 @@ from plain import Text, march
 from samples import numbers, path, spring
 from scipy.integrate import solve_ivp
 
+from synchain import Scene
 from synchain.codegen.program.statements import walk
 from synchain.codegen.steps.safe_names import tidy
 from synchain.codegen.taylor import order_for, write_looped, write_step
 from synchain.codegen.taylor.taylor_step import called
-from synchain.models import Scene, chain, complete
+from synchain.graphs import chain, complete
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME as T
 from synchain.models.mechanics.components import Edge, Node

@@ -15,7 +15,7 @@ from family_sizes import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synchain.models import chain, ring, star
+from synchain.graphs import chain, ring, star
 from synchain.models.algebra.equality import equal
 from synchain.models.claims.language import read_claims
 from synchain.models.claims.number_text import exact_number, whole_number

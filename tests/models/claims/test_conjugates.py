@@ -8,7 +8,7 @@ import pytest
 import sympy as sp
 from flint import fmpq_poly
 
-from synchain.models import chain, ring, star, wheel
+from synchain.graphs import chain, ring, star, wheel
 from synchain.models.algebra.cosine_sums import AngleSum, expression, minimal_polynomial
 from synchain.models.algebra.minimal_polynomials import multiplied
 from synchain.models.claims.cosine_text import cosine_sum

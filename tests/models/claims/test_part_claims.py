@@ -13,7 +13,7 @@ import sympy as sp
 from claim_files import verdicts
 from effort import effort
 
-from synchain.models import chain, feed_forward, ring, star
+from synchain.graphs import chain, feed_forward, ring, star
 from synchain.models.algebra.cosine_sums import AngleSum
 from synchain.models.algebra.equality import sign
 from synchain.models.claims.parts import interval, read_part

@@ -16,8 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sympy.physics.mechanics import dynamicsymbols
 
+from synchain import Field, Lagrangian, Parameter, friction, friction_law
 from synchain.codegen.program.functions import FUNCTIONS as PRINTED
-from synchain.models import Field, Lagrangian, Parameter, friction, friction_law
 from synchain.models.definitions.loader import load_friction_law, load_oscillator
 from synchain.models.definitions.table import as_name_or_table, law_of_table, oscillator_of_table
 from synchain.models.inputs.expression_text import FUNCTIONS

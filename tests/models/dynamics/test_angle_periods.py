@@ -52,7 +52,7 @@ def test_a_state_that_another_rate_has_bare_is_no_angle() -> None:
     [("sin(q_j - q_i)", 4), ("sin(q_j/3)", 12), ("q_j - q_i", None), ("sin(q_i)*q_j", None), ("sin(q_j)*q_i", None)],
 )
 def test_links_decide_by_either_end(push: str, period: int | None) -> None:
-    scene = sc.Scene(sc.Field({"q": "sin(q/2)"}), sc.Rates({"q": f"W*({push})"}), sc.ring(5))
+    scene = sc.Scene(sc.Field({"q": "sin(q/2)"}), sc.Rates({"q": f"W*({push})"}), sc.graphs.ring(5))
     expected = None if period is None else pytest.approx(period * math.pi)
     assert periods_of_kinds(scene.equations) == ((expected,),)
     assert periods_of_states(scene.equations) == (expected,) * 5

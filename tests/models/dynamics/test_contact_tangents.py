@@ -8,10 +8,10 @@ import sympy as sp
 from event_reference import Reference
 from mpmath import mp, mpf
 
-from synchain.models import Scene, Topology, clusters, topology
+from synchain import Scene, cluster_exponents, lyapunov_spectrum, periodic_orbit
+from synchain.graphs import Topology, clusters, topology
 from synchain.models.dynamics.saltation import of_network
 from synchain.models.dynamics.variational import MODE, clustered, mode, network_variation
-from synchain.runtime import cluster_exponents, lyapunov_spectrum, periodic_orbit
 from synchain.runtime.stability.orbits import OrbitProblem
 
 ONE, PAIR = topology("chain", 1), topology("chain", 2)

@@ -9,8 +9,8 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
+from synchain import Rates, Scene, ends
 from synchain.codegen.driver.columns import SpanColumn
-from synchain.models import Rates, Scene, ends
 from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
 from synchain.models.inputs.plugins import allow_code
@@ -37,7 +37,7 @@ PAIR, ALONE = topology("chain", 2), topology("chain", 1)
 PERIOD = 2 * np.pi / 1.2
 OWN = '''
 """Oscillator with two wells, its natural frequency called omega."""
-from synchain.models import Lagrangian
+from synchain import Lagrangian
 
 OSCILLATOR = Lagrangian(
     "v**2/2", "-omega**2*x**2/2 + x**4/4 - F*x*({wave})", {{"x": "-d*v"}}, coordinates={{"x": "v"}},

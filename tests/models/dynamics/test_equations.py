@@ -15,7 +15,7 @@ import sympy as sp
 from differences import DIGITS, close, evaluate, made, slopes, states
 from effort import effort
 
-from synchain.models import from_matrix, topology
+from synchain.graphs import from_matrix, topology
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.links import Link
 from synchain.models.mechanics.calculus import derivative

@@ -13,10 +13,10 @@ from samples import clocks
 from scipy.integrate import solve_ivp
 from sympy.physics import mechanics
 
+from synchain import Scene, load_scene, run
 from synchain.codegen.export.python import to_python
-from synchain.models import Scene, chain, from_matrix, load_scene, topology
+from synchain.graphs import chain, from_matrix, topology
 from synchain.models.dynamics.equations import Equations
-from synchain.runtime import run
 
 T = mechanics.dynamicsymbols._t
 

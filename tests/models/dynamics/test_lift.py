@@ -28,27 +28,27 @@ GAP = sc.Rates({i.x: g * W * sp.tanh((i.x + j.x) * (j.v - i.v))}, {g: 0.2})
 BY_SOURCE = sc.Rates({i.v: k * W * j.mu**2 * j.x}, {k: 0.3})
 SCENES = {
     "one node": (sc.Scene(VAN_DER_POL), "mu"),
-    "link": (sc.Scene(VAN_DER_POL, PULL, sc.star(4)), "k"),
-    "layers": (sc.Scene(VAN_DER_POL, links=[(PULL, sc.ring(5)), (GAP, sc.star(5))]), "g"),
+    "link": (sc.Scene(VAN_DER_POL, PULL, sc.graphs.star(4)), "k"),
+    "layers": (sc.Scene(VAN_DER_POL, links=[(PULL, sc.graphs.ring(5)), (GAP, sc.graphs.star(5))]), "g"),
     "kinds": (
-        sc.Scene(VAN_DER_POL, "x->v", sc.chain(4), nodes=[{"oscillator": SLOW, "at": [2, 3]}]),
+        sc.Scene(VAN_DER_POL, "x->v", sc.graphs.chain(4), nodes=[{"oscillator": SLOW, "at": [2, 3]}]),
         "sigma",
     ),
-    "one node's parameter": (sc.Scene(VAN_DER_POL, PULL, sc.ring(3), parameters={"mu": [0.5, 1.0, 2.0]}), "mu_2"),
+    "one node's parameter": (sc.Scene(VAN_DER_POL, PULL, sc.graphs.ring(3), parameters={"mu": [0.5, 1.0, 2.0]}), "mu_2"),
     "parameter of the source": (
-        sc.Scene(VAN_DER_POL, BY_SOURCE, sc.ring(3), parameters={"mu": [0.5, 1.0, 2.0]}),
+        sc.Scene(VAN_DER_POL, BY_SOURCE, sc.graphs.ring(3), parameters={"mu": [0.5, 1.0, 2.0]}),
         "mu_3",
     ),
     "one link's parameter": (
-        sc.Scene(VAN_DER_POL, links=[(PULL, sc.ring(3)), (GAP, sc.chain(3))], parameters={"k": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]}),
+        sc.Scene(VAN_DER_POL, links=[(PULL, sc.graphs.ring(3)), (GAP, sc.graphs.chain(3))], parameters={"k": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]}),
         "k_1_3",
     ),
     "mean field": (
-        sc.Scene(PHASE, sc.Rates({"theta": "k*W*sin(theta_j - theta_i - lag)"}, {"k": 0.5, "lag": 0.3}), sc.complete(9)),
+        sc.Scene(PHASE, sc.Rates({"theta": "k*W*sin(theta_j - theta_i - lag)"}, {"k": 0.5, "lag": 0.3}), sc.graphs.complete(9)),
         "lag",
     ),
-    "masses": (sc.Scene(pendulum(4), "spring on q1", sc.chain(2), record=()), "gravity"),
-    "inertial links": (sc.Scene("harmonic", "inerter", sc.chain(3), record=()), "sigma"),
+    "masses": (sc.Scene(pendulum(4), "spring on q1", sc.graphs.chain(2), record=()), "gravity"),
+    "inertial links": (sc.Scene("harmonic", "inerter", sc.graphs.chain(3), record=()), "sigma"),
 }  # fmt: skip
 
 
@@ -144,7 +144,7 @@ def test_kernels_of_a_lift_give_the_multipliers_of_a_travelling_wave(method: str
         block = np.array([[own + shifts[0], own], [np.conj(own), np.conj(own + shifts[1])]])
         exponents += list(np.linalg.eigvals(block))
     expected = np.exp(np.array(exponents) * period)
-    found = multipliers(sc.Scene(node, link, sc.ring(n), initial=start), period, method, unroll)
+    found = multipliers(sc.Scene(node, link, sc.graphs.ring(n), initial=start), period, method, unroll)
     gaps = np.abs(found[:, None] - expected[None])
     assert gaps.min(axis=0).max() < 1e-10
     assert gaps.min(axis=1).max() < 1e-10

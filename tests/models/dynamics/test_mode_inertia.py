@@ -12,12 +12,12 @@ from parts import edge
 from samples import real
 from variational_reference import ALPHA, transversal_equations
 
-from synchain.models import Scene, chain, from_matrix, orbital_partitions
+from synchain import Scene, exponents
+from synchain.graphs import chain, from_matrix, orbital_partitions
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import network
 from synchain.models.dynamics.variational import MODE, clustered, mode
 from synchain.models.mechanics.components import TIME, Edge, Node
-from synchain.runtime import exponents
 from synchain.runtime.sweeps.certify import certify
 
 GRAPH = from_matrix([[-3, 1, 2], [1, -2, 1], [2, 1, -3]])

@@ -12,7 +12,7 @@ from effort import effort
 from parts import connectivity, coupling_of, edge, is_lagrangian, law_of, node, oscillator_of, parameters
 from sympy.physics import mechanics
 
-from synchain.models import Oscillator, Topology, from_matrix, topology
+from synchain.graphs import Topology, from_matrix, topology
 from synchain.models.definitions.definition import FRICTION_LAW, OSCILLATOR
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import network
@@ -22,6 +22,7 @@ from synchain.models.interactions.coupling import Coupling
 from synchain.models.mechanics.components import TIME, Node
 from synchain.models.mechanics.contact import ContactModel
 from synchain.models.mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, static_coefficient
+from synchain.plugins import Oscillator
 
 SPRING = coupling_of("spring")
 HARMONIC = oscillator_of("harmonic")

@@ -9,9 +9,11 @@ import pytest
 import sympy as sp
 from sympy.physics.mechanics import dynamicsymbols
 
-from synchain.models import Scene, end, load_scene, maximum, mean, minimum, nodes, rate, ring, variance
+from synchain import Scene, load_scene
+from synchain.graphs import ring
 from synchain.models.dynamics.observable_text import as_observable
 from synchain.models.inputs.names import TAKEN
+from synchain.observe import end, maximum, mean, minimum, nodes, rate, variance
 from synchain.runtime.results.labels import MEANINGS
 
 x, v, x_1, theta, t = sp.symbols("x v x_1 theta t")

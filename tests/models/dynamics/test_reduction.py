@@ -13,7 +13,7 @@ import sympy as sp
 from parts import edge, node
 from samples import friction_chain, harmonic_chain, looped, real
 
-from synchain.models import chain, complete, ring, star
+from synchain.graphs import chain, complete, ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import network
 from synchain.models.dynamics.reduction import collapse, quotient, substitute_constants

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import Rates, Scene, Topology, chain, complete, ends, from_matrix, ring
+from synchain import Rates, Scene, ends
+from synchain.graphs import Topology, chain, complete, from_matrix, ring
 from synchain.models.definitions.loader import load_oscillator
 from synchain.models.dynamics.synchrony import NoSynchrony, expect_vanishing, synchronous_node
 from synchain.models.dynamics.variational import mode

@@ -11,7 +11,7 @@ from differences import DIGITS, TABLE, close, evaluate, made, slopes, states
 from parts import edge, node
 from variational_reference import ALPHA, deviation_names, tangent_equations, transversal_equations
 
-from synchain.models import Topology, from_matrix, topology
+from synchain.graphs import Topology, from_matrix, topology
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import mode
 from synchain.models.mechanics.components import Edge, Node

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import chain, circulant, erdos_renyi, ring, star, torus
+from synchain.graphs import chain, circulant, erdos_renyi, ring, star, torus
 from synchain.models.algebra.cosine_sums import AngleSum
 from synchain.models.claims.language import Claim, Claimed
 from synchain.models.claims.verdict import verify

@@ -16,7 +16,7 @@ import sympy as sp
 from effort import effort
 from family_sizes import size, sizes
 
-from synchain import models
+import synchain
 from synchain.models.graphs.closed_forms import closed_form
 from synchain.models.graphs.families import TOPOLOGY, Family, family, names, topology
 from synchain.models.graphs.topology import Topology
@@ -481,19 +481,19 @@ def test_the_names_of_networkx_make_equal_graphs() -> None:
         n = size(name, 10)
         assert topology(other, n) == topology(name, n)
         assert topology(other, n).name == name
-        assert getattr(models, other)(n) == getattr(models, name)(n)
-        assert other in dir(models)
+        assert getattr(synchain.graphs, other)(n) == getattr(synchain.graphs, name)(n)
+        assert other in dir(synchain.graphs)
         assert other not in names()
     assert {"path": "chain", "cycle": "ring"}.items() <= TOPOLOGY.also.items()
-    assert Scene(topology=models.path(3)) == Scene(topology=models.chain(3))
+    assert Scene(topology=synchain.graphs.path(3)) == Scene(topology=synchain.graphs.chain(3))
     assert closed_form("path").text == closed_form("chain").text
 
 
 def test_editors_see_the_options_of_a_family() -> None:
-    assert str(inspect.signature(models.circulant)) == "(n: int, *, offsets=(1, 2))"
-    assert str(inspect.signature(models.small_world)) == "(n: int, *, neighbours=4, p='1/10', seed=0)"
-    assert str(inspect.signature(models.path)) == "(n: int)"
-    assert "name" in inspect.signature(type(models.circulant)).parameters
+    assert str(inspect.signature(synchain.graphs.circulant)) == "(n: int, *, offsets=(1, 2))"
+    assert str(inspect.signature(synchain.graphs.small_world)) == "(n: int, *, neighbours=4, p='1/10', seed=0)"
+    assert str(inspect.signature(synchain.graphs.path)) == "(n: int)"
+    assert "name" in inspect.signature(type(synchain.graphs.circulant)).parameters
 
 
 def test_functions_of_a_family_may_have_further_arguments_with_defaults() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import sympy as sp
 
-from synchain.models import chain, ring
+from synchain.graphs import chain, ring
 from synchain.models.algebra.equality import equal
 from synchain.models.graphs.symbolic import SymbolicTopology, from_symbols, read_symbols, weight
 from synchain.models.graphs.topology import Topology

@@ -19,7 +19,7 @@ import test_network
 import test_topologies
 from parts import node
 
-from synchain.models import chain
+from synchain.graphs import chain
 from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.graphs.families import TOPOLOGY, names, topology
 from synchain.models.inputs import plugins
@@ -243,7 +243,7 @@ def test_topologies_from_outside(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert Scene.from_dict(scene.as_dict()).topology == graph
     wrong = tmp_path / "wrong.py"
     wrong.write_text(
-        "from synchain.models import Family\ndef edges(n):\n    yield 0, 1, 1 / (n - n)\nTOPOLOGY = Family(edges, 1)\n"
+        "from synchain.plugins import Family\ndef edges(n):\n    yield 0, 1, 1 / (n - n)\nTOPOLOGY = Family(edges, 1)\n"
     )
     plugins.allow_code(wrong)
     with pytest.raises(ValueError, match=r"wrong.py, line 3: ZeroDivisionError"):
@@ -280,7 +280,7 @@ def test_the_groups_of_entry_points_are_read(monkeypatch: pytest.MonkeyPatch) ->
 
 # -- a file is its text ---------------------------------------------------------------------------------------
 
-HEAD = "from synchain.models import Family, Field, Lagrangian, Parameter, friction_law, link_energy\n"
+HEAD = "from synchain import Field, Lagrangian, Parameter, friction_law, link_energy; from synchain.plugins import Family\n"
 WELL = 'OSCILLATOR = Lagrangian("v**2/2", "x**2/2", coordinates={"x": "v"})\n'
 PULL = 'COUPLING = link_energy("sigma*W*(q_i - q_j)**2/2", parameters={"sigma": Parameter(0.1, "N/m", "stiffness")})\n'
 RUB = 'FRICTION = friction_law("c*w", {"c": Parameter(0.3, "s/m", "growth")})\n'
@@ -488,7 +488,7 @@ def test_wrong_answers_of_a_family_are_those_of_its_file(tmp_path: Path) -> None
 def test_a_file_may_assign_rates_and_potentials_of_links(tmp_path: Path) -> None:
     path = written(
         tmp_path / "pull.py",
-        "from synchain.models import Rates\nCOUPLING = Rates({'x': 'k*W*(x_j - x_i)'}, {'k': 0.1})\n",
+        "from synchain import Rates\nCOUPLING = Rates({'x': 'k*W*(x_j - x_i)'}, {'k': 0.1})\n",
     )
     scene = Scene("rossler", path, chain(2))
     assert Scene.from_dict(scene.as_dict()) == scene

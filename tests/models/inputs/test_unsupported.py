@@ -9,7 +9,7 @@ import pytest
 import synchain as sc
 from synchain.models.inputs.checks import listed
 
-PAIR = sc.Scene("van_der_pol", "x->x", sc.chain(2))
+PAIR = sc.Scene("van_der_pol", "x->x", sc.graphs.chain(2))
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def test_words_that_ask_for_other_things(call: Callable[[], object], message: st
 
 @pytest.mark.parametrize("function", [sc.equilibrium, sc.periodic_orbit, sc.lyapunov_spectrum])
 def test_functions_without_axes_refuse_lists(function: Callable[..., object]) -> None:
-    scene = sc.Scene("van_der_pol", "x->x", sc.chain(3))
+    scene = sc.Scene("van_der_pol", "x->x", sc.graphs.chain(3))
     with pytest.raises(ValueError, match=r"found a list for 'mu'; .* scene\.replace\(mu=\[…\]\)"):
         function(scene, mu=[0.1, 0.2])
 

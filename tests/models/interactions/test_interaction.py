@@ -10,7 +10,8 @@ import pytest
 import sympy as sp
 from catalogue import BODY, ROTOR, real
 
-from synchain.models import Parameter, Potential, Rates, Scene, chain, complete, ends, ring, star
+from synchain import Parameter, Potential, Rates, Scene, ends
+from synchain.graphs import chain, complete, ring, star
 from synchain.models.definitions.loader import load_oscillator
 from synchain.models.interactions.coupling import from_table
 from synchain.models.interactions.link import edge, strength

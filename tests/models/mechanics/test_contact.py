@@ -8,11 +8,11 @@ import sympy as sp
 from parts import node
 from scipy.integrate import quad
 
-from synchain.models import Lagrangian, Scene, friction_law, topology
+from synchain import Lagrangian, Scene, exponents, friction_law, run
+from synchain.graphs import topology
 from synchain.models.dynamics.reduction import substitute_constants
 from synchain.models.mechanics.contact import SLIP
 from synchain.models.mechanics.events import set_valued
-from synchain.runtime import exponents, run
 
 X, V, W, MU = (sp.Symbol(name, real=True) for name in ("x", "v", "w", "mu"))
 FORCE = sp.Function("f", real=True)

@@ -16,16 +16,17 @@ from parts import connectivity, edge, is_lagrangian, node, oscillator_of, parame
 from scipy.integrate import solve_ivp
 from variational_reference import ALPHA, deviation_names, transversal_equations
 
+from synchain import Scene, load_scene, run
 from synchain.codegen.program.lowering import lower
 from synchain.codegen.program.printers import LANES
-from synchain.models import Scene, chain, from_matrix, load_scene, ring, text
+from synchain.export import text
+from synchain.graphs import chain, from_matrix, ring
 from synchain.models.definitions.definition import OSCILLATOR
 from synchain.models.dynamics.network import network
 from synchain.models.inputs.plugins import names
 from synchain.models.interactions.coupling import MatrixCoupling
 from synchain.models.mechanics.components import Node
 from synchain.models.mechanics.oscillator import FieldModel
-from synchain.runtime import run
 
 STATE = ("x", "y", "z")
 WEIGHT, SIGMA = sp.symbols("weight sigma", real=True)

@@ -6,10 +6,10 @@ import pytest
 import sympy as sp
 from sympy.functions.elementary.piecewise import Piecewise
 
-from synchain.models import Field, Rates, Scene, chain
+from synchain import Field, Rates, Scene, cluster_exponents, exponents, lyapunov_spectrum, msf, periodic_orbit, run
+from synchain.graphs import chain
 from synchain.models.dynamics.variational import Variation, mode, network_variation, with_volume
 from synchain.models.mechanics.jumps import discontinuity, rough_at
-from synchain.runtime import cluster_exponents, exponents, lyapunov_spectrum, msf, periodic_orbit, run
 
 x, y, v, t, a = sp.symbols("x y v t a", real=True)
 

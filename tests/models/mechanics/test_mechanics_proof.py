@@ -12,7 +12,7 @@ from mechanics_proof import PARTICLES, T, by_kane, by_lagrange, residual, vanish
 from parts import edge, node, oscillator_of
 from parts import law_of as friction_law
 
-from synchain.models import Topology, topology
+from synchain.graphs import Topology, topology
 from synchain.models.definitions.definition import OSCILLATOR
 from synchain.models.dynamics.network import network
 from synchain.models.inputs.plugins import names

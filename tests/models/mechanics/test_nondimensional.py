@@ -14,13 +14,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from parts import edge, is_lagrangian, node, oscillator_of, parameters
 
-from synchain.models import Oscillator, Parameter, oscillators
+from synchain import Parameter
+from synchain.models import oscillators
 from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.inputs.plugins import PluginKind, load, names
 from synchain.models.mechanics.calculus import cancelled, operations
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.nondimensional import FRICTION, nondimensional, physical, scale
 from synchain.models.mechanics.parameter import dimension
+from synchain.plugins import Oscillator
 
 x, v = sp.symbols("x v", real=True)
 theta_b, epsilon, u, omega = sp.symbols("theta_b epsilon u omega", real=True)
@@ -116,7 +118,7 @@ def test_duffing_and_harmonic_are_as_published() -> None:
 
 # -- one new file is enough -----------------------------------------------------------------------------------
 
-HEADER = "from synchain.models import Field, Lagrangian, Parameter\n"
+HEADER = "from synchain import Field, Lagrangian, Parameter\n"
 VAN_DER_POL = (
     HEADER
     + """

@@ -11,16 +11,16 @@ import sympy as sp
 from parts import is_lagrangian, node, oscillator_of
 from scipy.integrate import solve_ivp
 
-from synchain.models import Scene, Section, chain, from_matrix, ring, star
+from synchain import Scene, Section, exponents, run
+from synchain.graphs import chain, from_matrix, ring, star
 from synchain.models.definitions.definition import OSCILLATOR
 from synchain.models.dynamics.network import oriented_links
 from synchain.models.dynamics.variational import source_slopes
 from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.components import TIME
-from synchain.models.scenes.energy import energy
+from synchain.models.scenes.energy import energy_terms
 from synchain.models.sweeps.initial_values import default_start
-from synchain.runtime import exponents, run
 
 X, Y, Z, V = sp.symbols("x y z v", real=True)
 A, B, C, P, Q, MU, U = sp.symbols("a b c p q mu u", real=True)
@@ -278,7 +278,7 @@ def test_equations_written_by_hand(oscillator: str, friction: str | None) -> Non
 
 
 def test_joints_of_double_pendulums_lose_energy() -> None:
-    power = energy(Scene(oscillator="double_pendulum")).nodes[0].power
+    power = energy_terms(Scene(oscillator="double_pendulum")).nodes[0].power
     delta, one, two = sp.symbols("delta w_phi w_psi", real=True)
     assert sp.expand(power + delta * (one**2 + (two - one) ** 2)) == 0
 

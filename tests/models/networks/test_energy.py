@@ -10,14 +10,16 @@ from catalogue import FORCES, LAGRANGIAN
 from mechanics_proof import vanishes
 from parts import oscillator_of
 
-from synchain.models import Oscillator, Parameter, Potential, Rates, Scene, chain, complete, ends, ring
+from synchain import Parameter, Potential, Rates, Scene, ends
+from synchain.graphs import chain, complete, ring
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.lagrangian import total_derivative
 from synchain.models.mechanics.oscillator import Coordinate, LagrangianModel
-from synchain.models.scenes.energy import energy
+from synchain.models.scenes.energy import energy_terms
 from synchain.models.scenes.file import load_scene
+from synchain.plugins import Oscillator
 from synchain.runtime.results.energy_of_states import energy_function
 
 
@@ -29,7 +31,7 @@ def scene_of(oscillator: str, coupling: str, n: int = 2, **more: object) -> Scen
 def balance(scene: Scene) -> sp.Expr:
     """dE/dt along the equations of the whole network less the power, in state symbols."""
     equations = scene.equations
-    total, power = energy(scene).whole()
+    total, power = energy_terms(scene).whole()
     state, half = sp.symbols(equations.state, real=True), equations.dimension // 2
     rates = equations.rhs()
     return total_derivative(total, state[:half], state[half:], rates[half:]) - power
@@ -50,7 +52,7 @@ def test_the_power_of_every_oscillator_with_a_spring(oscillator: str) -> None:
 def test_the_power_of_a_cart_with_pendulums_that_is_joined_to_another() -> None:
     """In numbers: the symbolic proof of one of them alone is in test_lagrangian.py, and two would take minutes."""
     scene = scene_of("belt_double_pendulum", "spring on x", parameters={"sigma": 0.4, "damping": 0.2})
-    total, power = energy(scene).whole()
+    total, power = energy_terms(scene).whole()
     state, half = sp.symbols(scene.equations.state, real=True), scene.equations.dimension // 2
     at = dict(zip(state, np.random.default_rng(3).uniform(-1, 1, 2 * half), strict=True))
     at |= {sp.Symbol(name, real=True): value for name, value in scene.parameters.items()}
@@ -79,7 +81,7 @@ def unequal() -> dict[str, Scene]:
 def test_the_power_of_unequal_nodes_and_of_links_with_inertia(name: str) -> None:
     """In 40 digits at random states: M is solved by numbers, as the equations are."""
     scene = unequal()[name]
-    eq, (total, power) = scene.equations, energy(scene).whole()
+    eq, (total, power) = scene.equations, energy_terms(scene).whole()
     state, random = sp.symbols(eq.state, real=True), np.random.default_rng(3)
     symbols = [TIME, *state, *sp.symbols(eq.parameters, real=True)]
     mass = sp.Matrix(sp.SparseMatrix(eq.dimension, eq.dimension, eq.mass())) if eq.inertial else sp.eye(eq.dimension)
@@ -96,8 +98,8 @@ def test_the_power_of_unequal_nodes_and_of_links_with_inertia(name: str) -> None
 
 @pytest.mark.parametrize("coupling", FORCES)
 def test_what_conserves_energy(coupling: str) -> None:
-    assert energy(scene_of("harmonic", coupling)).conservative == ("damper" not in coupling)
-    assert not energy(scene_of("duffing", coupling)).conservative
+    assert energy_terms(scene_of("harmonic", coupling)).conservative == ("damper" not in coupling)
+    assert not energy_terms(scene_of("duffing", coupling)).conservative
 
 
 def test_what_has_no_energy() -> None:
@@ -111,7 +113,7 @@ def test_what_has_no_energy() -> None:
         ({"contact": "set-valued"}, "set-valued friction does work that is no function of the state"),
     ):
         with pytest.raises(ValueError, match=message):
-            energy(Scene(**keywords))
+            energy_terms(Scene(**keywords))
 
 
 def pendulums() -> Scene:
@@ -179,11 +181,11 @@ def test_bodies_of_different_masses_have_an_energy_and_rates_have_none() -> None
     gravity = Potential(-g * w * i.m * j.m / sp.sqrt((i.x - j.x) ** 2 + (i.y - j.y) ** 2), {g: 1})
     for masses in ([1.0, 2.0, 3.0], 1.0):
         scene = Scene(oscillator=body, coupling=gravity, topology=complete(3), parameters={"m": masses})
-        total, power = energy(scene).whole()
+        total, power = energy_terms(scene).whole()
         states = [sp.Symbol(name, real=True) for name in scene.equations.state]
         drift = sum(total.diff(s) * rate for s, rate in zip(states, scene.equations.rhs(), strict=True))
         values = {s: sp.Rational(3 * k + 1, 7) for k, s in enumerate(sorted(drift.free_symbols, key=str))}
         assert power == 0
         assert abs(sp.N(drift.xreplace(values), 30)) < 1e-25
     with pytest.raises(ValueError, match="energy: the coupling 'rates of u' has none"):
-        energy(scene.replace(coupling=Rates({i.u: w * j.x}), parameters=None))
+        energy_terms(scene.replace(coupling=Rates({i.u: w * j.x}), parameters=None))

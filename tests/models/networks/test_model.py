@@ -8,7 +8,8 @@ from dataclasses import replace
 import pytest
 import sympy as sp
 
-from synchain.models import FrictionLaw, Oscillator, Parameter, Scene, chain
+from synchain import Parameter, Scene
+from synchain.graphs import chain
 from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.inputs.names import NodeName
 from synchain.models.interactions.coupling import WEIGHT, LagrangianCoupling, MatrixCoupling
@@ -16,6 +17,7 @@ from synchain.models.mechanics.contact import ContactModel
 from synchain.models.mechanics.oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel
 from synchain.models.networks.layers import as_law, as_oscillator
 from synchain.models.networks.model import Model, NodeKind
+from synchain.plugins import FrictionLaw, Oscillator
 
 x, v, w, mu, k, sigma, q_i, q_j = sp.symbols("x v w mu k sigma q_i q_j", real=True)
 DUMB = LagrangianModel((Coordinate("x", "v"),), v**2 / 2, k * x**2 / 2, (FRICTION(1 - v),))

@@ -12,7 +12,8 @@ from differences import made
 from parts import edge, is_lagrangian, node, oscillator_of
 from variational_reference import tangent_equations, transversal_equations
 
-from synchain.models import Rates, Scene, ring, star
+from synchain import Rates, Scene
+from synchain.graphs import ring, star
 from synchain.models.definitions.definition import FRICTION_LAW, OSCILLATOR
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.families import topology

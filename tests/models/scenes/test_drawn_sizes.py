@@ -12,4 +12,4 @@ from synchain.models.graphs.families import FamilyRule
 def test_no_link_is_drawn_of_a_graph_with_other_nodes(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(FamilyRule, "links", None)
     with pytest.raises(ValueError, match=r"found graphs of \d+ nodes; expected graphs of 2 nodes"):
-        sc.Scene("mass", "spring", sc.chain(2), realisations=2, draws={"topology": text})
+        sc.Scene("mass", "spring", sc.graphs.chain(2), realisations=2, draws={"topology": text})

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import pytest
 
-from synchain.models import Field, Rates, Scene, chain
+from synchain import Field, Rates, Scene
+from synchain.graphs import chain
 from synchain.models.inputs.names import ATTRIBUTES, TAKEN
 
 

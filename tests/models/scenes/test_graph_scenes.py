@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 import synchain.models
-from synchain.models import Scene, cartesian, chain, circulant, erdos_renyi, load_scene, topology, torus
+from synchain import Scene, load_scene
+from synchain.graphs import cartesian, chain, circulant, erdos_renyi, topology, torus
 
 
 def test_families_take_their_options_as_functions() -> None:
@@ -16,7 +17,7 @@ def test_families_take_their_options_as_functions() -> None:
     assert torus(27, shape=(3, 3, 3)).options == (("shape", (3, 3, 3)),)
     with pytest.raises(ValueError, match="unknown option 'offsets'; this family has none"):
         chain(4, offsets=1)
-    assert "options" in synchain.models.circulant.__doc__
+    assert "options" in synchain.graphs.circulant.__doc__
 
 
 def test_options_stand_in_scene_files(tmp_path: Path) -> None:
@@ -38,7 +39,7 @@ def test_options_stand_in_scene_files(tmp_path: Path) -> None:
     [circulant(8, offsets=(1, 4)), erdos_renyi(6, p="2/3", seed=3), torus(27, shape=(3, 3, 3)), torus(9), chain(3)],
     ids=str,
 )
-def test_scenes_with_options_come_back(graph: synchain.models.Topology) -> None:
+def test_scenes_with_options_come_back(graph: synchain.graphs.Topology) -> None:
     scene = Scene(topology=graph)
     written = scene.as_dict()
     assert written["topology"]["n"] == graph.n

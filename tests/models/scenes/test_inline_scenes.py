@@ -14,19 +14,8 @@ from catalogue import paths
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from synchain.models import (
-    Field,
-    Lagrangian,
-    Parameter,
-    Scene,
-    chain,
-    friction_law,
-    link_energy,
-    load_scene,
-    ring,
-    scene_names,
-    star,
-)
+from synchain import Field, Lagrangian, Parameter, Scene, friction_law, link_energy, load_scene, scene_names
+from synchain.graphs import chain, ring, star
 from synchain.models.definitions.loader import load_oscillator, read_coupling
 from synchain.models.mechanics.contact import ContactModel
 from synchain.models.mechanics.oscillator import Oscillator

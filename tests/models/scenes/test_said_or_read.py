@@ -12,7 +12,8 @@ import sympy as sp
 from scipy import special
 from sympy.codegen.cfunctions import expm1, log1p
 
-from synchain import Field, Potential, Rates, Scene, chain, exprel, from_edges, load_scene, run
+from synchain import Field, Potential, Rates, Scene, exprel, load_scene, run
+from synchain.graphs import chain, from_edges
 
 x = sp.Symbol("x")
 NODE = Field({"x": "-x"})

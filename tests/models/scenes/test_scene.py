@@ -21,7 +21,8 @@ from catalogue import paths
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synchain.models import Axis, Scene, Section, Topology, cartesian, chain, complete, ring, star, weighted
+from synchain import Axis, Scene, Section
+from synchain.graphs import Topology, cartesian, chain, complete, ring, star, weighted
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.scenes.file import load_scene, scene_names

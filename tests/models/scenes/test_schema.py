@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 from jsonschema import Draft4Validator, Draft7Validator
 
-from synchain.models import Axis, Scene, Topology, load_scene, scene_names
+from synchain import Axis, Scene, load_scene, scene_names
+from synchain.graphs import Topology
 from synchain.models.graphs.families import family, names
 from synchain.models.networks.model import Group
 from synchain.models.scenes.scene import KEYWORDS

@@ -11,13 +11,14 @@ from catalogue import real
 from scipy.integrate import solve_ivp
 from variational_reference import transversal_equations
 
+from synchain import Field, Lagrangian, Scene, exponents, link_energy, load_scene, open_result, run
 from synchain.codegen.export.python import to_python
 from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
-from synchain.models import Field, Lagrangian, Scene, chain, from_matrix, link_energy, load_scene, ring, star, text
+from synchain.export import text
+from synchain.graphs import chain, from_matrix, ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Node
-from synchain.runtime import exponents, open_result, run
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.sweeps.certify import certify
 from synchain.runtime.synchronisation.probe import ring_of_three

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from synchain import Field, Lagrangian, Rates, Scene, Topology, chain, from_edges, load_scene, ring, scene_names
+from synchain import Field, Lagrangian, Rates, Scene, load_scene, scene_names
+from synchain.graphs import Topology, chain, from_edges, ring
 
 NODE = Field({"x": "-x"})
 PAIRS = from_edges([(1, 2), (3, 4)])

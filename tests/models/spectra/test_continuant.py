@@ -7,7 +7,7 @@ import random
 import pytest
 from flint import fmpz_mat, fmpz_poly
 
-from synchain.models import Topology, chain, complete, one_way_ring, ring, star, tree, union
+from synchain.graphs import Topology, chain, complete, one_way_ring, ring, star, tree, union
 from synchain.models.spectra.characteristic import banded, characteristic, cyclic, forest, sparse
 
 

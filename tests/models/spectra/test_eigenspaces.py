@@ -13,7 +13,7 @@ import sympy as sp
 from family_sizes import size
 from flint import fmpq
 
-from synchain.models import chain, complete, erdos_renyi, feed_forward, one_way_ring, ring, star, weighted
+from synchain.graphs import chain, complete, erdos_renyi, feed_forward, one_way_ring, ring, star, weighted
 from synchain.models.algebra.minimal_polynomials import minimal_polynomial
 from synchain.models.graphs.families import names, topology
 from synchain.models.graphs.matrices import GraphMatrix, MatrixKind

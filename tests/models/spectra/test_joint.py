@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from synchain.models import chain, circulant, complete, erdos_renyi, from_matrix, joint_spectrum, ring, star, topology
+from synchain.graphs import chain, circulant, complete, erdos_renyi, from_matrix, joint_spectrum, ring, star, topology
 from synchain.models.graphs.topology import Topology
 
 

@@ -10,7 +10,7 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synchain.models import chain, complete, feed_forward, ring
+from synchain.graphs import chain, complete, feed_forward, ring
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.products import cartesian, kronecker, union
 from synchain.models.graphs.topology import Topology, from_matrix

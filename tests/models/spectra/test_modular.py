@@ -10,7 +10,7 @@ import sympy as sp
 from catalogue import CLOSED
 from family_sizes import size, sizes
 
-from synchain.models import Topology, chain, one_way_ring, ring, star
+from synchain.graphs import Topology, chain, one_way_ring, ring, star
 from synchain.models.graphs.families import family, topology
 from synchain.models.graphs.products import cartesian, complement, kronecker, union, weighted
 from synchain.models.spectra.eigenvalue import ProofError

@@ -22,7 +22,7 @@ from family_sizes import size, sizes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synchain.models import Spectrum, Topology, from_graph, from_matrix, topology
+from synchain.graphs import Spectrum, Topology, from_graph, from_matrix, topology
 from synchain.models.algebra.cosines import biquadratic, cosine, linear_cosine, minimal_polynomial
 from synchain.models.algebra.isolation import discs, sign
 from synchain.models.algebra.roots import ComplexRoot, RealRoot, roots

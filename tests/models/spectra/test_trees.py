@@ -12,7 +12,7 @@ import pytest
 from catalogue import UNDIRECTED, UNEVEN
 from family_sizes import size
 
-from synchain.models import chain, complete, complete_bipartite, hypercube, kneser, one_way_ring, ring, star, wheel
+from synchain.graphs import chain, complete, complete_bipartite, hypercube, kneser, one_way_ring, ring, star, wheel
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.products import union, weighted
 from synchain.models.graphs.readers import from_edges

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from catalogue import UNEVEN, floats
 
-from synchain.models import cartesian, chain, complete, feed_forward, from_edges, from_matrix, petersen, star, topology
+from synchain.graphs import cartesian, chain, complete, feed_forward, from_edges, from_matrix, petersen, star, topology
 from synchain.models.graphs.topology import Topology
 from synchain.models.symmetries.mode_classes import LARGEST, mode_classes, together
 

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from synchain.models import Field, Lagrangian
+from synchain import Field, Lagrangian
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.bifurcation.bifurcations import OrbitPair

@@ -18,8 +18,8 @@ PHASE = sc.Field({"theta": "w"}, parameters={"w": 0})
 PULL = sc.Rates({"theta": "K*W*sin(theta_j - theta_i)"}, {"K": 1})
 
 
-def grid(*powers: float, graph: sc.Topology | None = None) -> sc.Scene:
-    return sc.Scene(MACHINE, LINE, graph or sc.chain(len(powers)), parameters={"P": list(powers)})
+def grid(*powers: float, graph: sc.graphs.Topology | None = None) -> sc.Scene:
+    return sc.Scene(MACHINE, LINE, graph or sc.graphs.chain(len(powers)), parameters={"P": list(powers)})
 
 
 @pytest.mark.parametrize("power", [0.0, 0.3, 0.9, 0.9999])
@@ -70,7 +70,7 @@ def test_machines_whose_powers_do_not_add_up_to_zero_turn_together() -> None:
 def test_phases_of_kuramoto_lock_at_the_mean_frequency() -> None:
     """On a complete graph K r sin(theta_i - psi) = w_i - mean(w), r exp(i psi) the sum of exp(i theta)."""
     w = np.linspace(-1.0, 2.0, 7)
-    result = sc.equilibrium(sc.Scene(PHASE, PULL, sc.complete(7), parameters={"w": w.tolist(), "K": 0.5}))
+    result = sc.equilibrium(sc.Scene(PHASE, PULL, sc.graphs.complete(7), parameters={"w": w.tolist(), "K": 0.5}))
     field = np.exp(1j * result.state).sum()
     np.testing.assert_allclose(np.sin(result.state - np.angle(field)) * 0.5 * abs(field), w - w.mean(), atol=1e-12)
     assert result.speeds == pytest.approx([w.mean()], abs=1e-13)
@@ -98,7 +98,7 @@ def test_masses_that_depend_on_angles() -> None:
 
 def test_a_drive_of_strength_zero_is_none() -> None:
     """Duffing's oscillator with a soft spring, x + beta x^3 = 0: a saddle at 1/2 if beta = -4."""
-    scene = sc.Scene("duffing", topology=sc.chain(2), parameters={"beta": -4.0}, initial={"x": 0.45, "v": 0.0})
+    scene = sc.Scene("duffing", topology=sc.graphs.chain(2), parameters={"beta": -4.0}, initial={"x": 0.45, "v": 0.0})
     result = sc.equilibrium(scene, u=0)
     np.testing.assert_allclose(result.state, [0.5, 0.5, 0.0, 0.0], atol=1e-12)
     assert result.growing == 2
@@ -108,7 +108,7 @@ def test_a_drive_of_strength_zero_is_none() -> None:
 
 def test_links_with_inertia() -> None:
     """Modes of a chain of three, whose Laplacian has the eigenvalues 0, 1, 3: squares of frequencies 1/(1 + sigma gamma)."""
-    result = sc.equilibrium(sc.Scene("harmonic", "inerter", sc.chain(3), parameters={"sigma": 0.5}))
+    result = sc.equilibrium(sc.Scene("harmonic", "inerter", sc.graphs.chain(3), parameters={"sigma": 0.5}))
     frequencies = np.sort(result.eigenvalues.imag)[3:]
     np.testing.assert_allclose(frequencies**2, [0.4, 1 / 1.5, 1.0], rtol=1e-12)
 
@@ -128,10 +128,10 @@ def test_a_flat_place_is_no_shift(start: float) -> None:
 @pytest.mark.parametrize(
     "scene",
     [
-        sc.Scene("fitzhugh_nagumo", "x->x, y->x", sc.star(4)),
-        sc.Scene("double_pendulum", topology=sc.chain(3)),
-        sc.Scene("harmonic", "inerter", sc.chain(3)),
-        grid(0.1, 0.2, -0.3, graph=sc.ring(3)),
+        sc.Scene("fitzhugh_nagumo", "x->x, y->x", sc.graphs.star(4)),
+        sc.Scene("double_pendulum", topology=sc.graphs.chain(3)),
+        sc.Scene("harmonic", "inerter", sc.graphs.chain(3)),
+        grid(0.1, 0.2, -0.3, graph=sc.graphs.ring(3)),
     ],
     ids=["field", "masses", "inerters", "numbers of nodes"],
 )
@@ -153,14 +153,14 @@ def test_rates_jacobian_and_masses_are_those_of_the_equations(scene: sc.Scene) -
 
 def test_links_and_nodes_with_numbers_of_their_own() -> None:
     strengths = {"K": [[0, 2.0, 0], [2.0, 0, 3.0], [0, 3.0, 0]]}
-    scene = sc.Scene(MACHINE, LINE, sc.chain(3), parameters={"P": [0.5, 0.0, -0.5], **strengths})
+    scene = sc.Scene(MACHINE, LINE, sc.graphs.chain(3), parameters={"P": [0.5, 0.0, -0.5], **strengths})
     result = sc.equilibrium(scene)
     np.testing.assert_allclose(-np.diff(result.state[:3]), np.arcsin([0.25, 0.5 / 3.0]), atol=1e-12)
 
 
 def test_a_large_network_is_not_called_stable_by_a_few_eigenvalues(monkeypatch: pytest.MonkeyPatch) -> None:
     n = 60
-    scene = grid(*(0.01 * np.cos(2.0 * np.pi * np.arange(n) / n)), graph=sc.ring(n))
+    scene = grid(*(0.01 * np.cos(2.0 * np.pi * np.arange(n) / n)), graph=sc.graphs.ring(n))
     full = sc.equilibrium(scene)
     monkeypatch.setattr(module, "DENSE", 2 * n - 1)
     few = sc.equilibrium(scene)
@@ -183,7 +183,7 @@ def test_starts_are_those_of_runs(tmp_path: Path) -> None:
     np.testing.assert_allclose(stays.end.values.ravel(), result.state, atol=1e-9)
     result.save(tmp_path / "rest.nc")
     opened = sc.open_result(tmp_path / "rest.nc")
-    assert isinstance(opened, sc.Equilibrium)
+    assert isinstance(opened, sc.results.Equilibrium)
     assert opened.shifts == result.shifts
     np.testing.assert_array_equal(opened.eigenvalues, result.eigenvalues)
 
@@ -232,7 +232,9 @@ def test_units_of_time_and_state_change_nothing(unit: float) -> None:
 def test_identical_phases_at_zero_lock_at_their_lagging_speed_in_any_unit_of_time(unit: float) -> None:
     """All rates are 0.3 unit + 2 unit sin(-0.1) but for rounding, and no state has a size."""
     lagging = sc.Rates({"theta": "K*W*sin(theta_j - theta_i - 1/10)"}, {"K": unit})
-    result = sc.equilibrium(sc.Scene(PHASE, lagging, sc.cycle(5), parameters={"w": 0.3 * unit}, initial={"theta": 0.0}))
+    result = sc.equilibrium(
+        sc.Scene(PHASE, lagging, sc.graphs.cycle(5), parameters={"w": 0.3 * unit}, initial={"theta": 0.0})
+    )
     assert result.speeds / unit == pytest.approx([0.3 - 2.0 * np.sin(0.1)], rel=1e-14)
     assert result.stable
 
@@ -241,7 +243,7 @@ def test_identical_phases_at_zero_lock_at_their_lagging_speed_in_any_unit_of_tim
 def test_rates_that_level_off_above_zero_have_no_equilibrium(form: str) -> None:
     """k - V f(S) with k >= V, alone and in a linked pair, in any units; with k < V there is one."""
     pool = sc.Field({"S": f"k - V*({form})"}, parameters={"k": 1, "V": 1, "K": 1})
-    lone, pair = sc.Scene(pool, None), sc.Scene(pool, sc.Rates({"S": "d*W*(S_j - S_i)"}, {"d": 1}), sc.chain(2))
+    lone, pair = sc.Scene(pool, None), sc.Scene(pool, sc.Rates({"S": "d*W*(S_j - S_i)"}, {"d": 1}), sc.graphs.chain(2))
     for size, unit in ((1.0, 1.0), (1e-6, 1e3), (1e9, 1e-5)):
         for k in (1.5, 1.0):
             for scene in (lone, pair.replace(parameters={"d": 0.3 * unit})):
@@ -288,14 +290,14 @@ def test_free_masses_keep_their_mean_velocity(
     """Any common velocity is an equilibrium up to a shift: the one of the start's momentum and centre is nearest to the start."""
     mass = sc.Lagrangian("m*v**2/2", "0", coordinates={"x": "v"}, parameters={"m": 5})
     x, v = np.array([0.0, 0.1, 0.3]), size * np.array([1e-3, 0.0, -0.4])
-    result = sc.equilibrium(sc.Scene(mass, link, sc.chain(3), initial={"x": x, "v": v}, parameters=parameters))
+    result = sc.equilibrium(sc.Scene(mass, link, sc.graphs.chain(3), initial={"x": x, "v": v}, parameters=parameters))
     np.testing.assert_allclose(result.speeds, [v.mean()], rtol=1e-9)
     np.testing.assert_allclose(result.state, [x.mean()] * 3 + [v.mean()] * 3, rtol=1e-9)
 
 
 def test_where_newton_fails_the_motion_leads_to_rest() -> None:
     """A pair of which the run ends at x = (-.229, -.867); a chain in a double well, begun beside a ridge."""
-    graph = sc.from_sparse(sparse.coo_array([[0.0, 0.71], [-0.46, 0.0]]), adjacency=True)
+    graph = sc.graphs.from_sparse(sparse.coo_array([[0.0, 0.71], [-0.46, 0.0]]), adjacency=True)
     link = sc.Rates({"x": "K*W*sin(x_j - x_i)"}, {"K": 0.7})
     start = {"x": [0.785, -0.311], "y": 0.0}
     result = sc.equilibrium(sc.Scene(RELAXING, link, graph, initial=start, parameters={"p": [0.37, -0.38]}))

@@ -22,7 +22,7 @@ POWERS = [1.0, -0.6, 0.4, -1.1, 0.3]
 def brusselators(n: int = 6, B: float = 2.0) -> sc.Scene:
     node = sc.Field({"x": "2 - (B + 1)*x + x**2*y", "y": "B*x - x**2*y"}, parameters={"B": B})
     link = sc.Rates({"x": "Dx*W*(x_j - x_i)", "y": "Dy*W*(y_j - y_i)"}, {"Dx": 0.1, "Dy": 1})
-    return sc.Scene(node, link, sc.ring(n), initial={"x": 2, "y": B / 2})
+    return sc.Scene(node, link, sc.graphs.ring(n), initial={"x": 2, "y": B / 2})
 
 
 def jansen_rit() -> sc.Scene:
@@ -42,7 +42,7 @@ def values_of(branch: Branch, kind: str) -> list[float]:
 
 def test_two_bistable_cells_in_closed_form() -> None:
     """Branch points at K = 1/2 (x = 0) and 1/3 (x = -y = 1/sqrt 3); beyond, x, y = (sqrt .4 +- sqrt 1.2)/2 at K = 0.2."""
-    scene = sc.Scene(CELL, PULL, sc.chain(2), initial={"x": 0})
+    scene = sc.Scene(CELL, PULL, sc.graphs.chain(2), initial={"x": 0})
     trivial = sc.follow(sc.equilibrium(scene), "K", to=0.7)
     (half,) = trivial.bifurcations
     assert half.kind == "branch point"
@@ -58,7 +58,7 @@ def test_two_bistable_cells_in_closed_form() -> None:
 
 
 def test_a_branch_that_is_born_in_a_pitchfork_turns_there() -> None:
-    scene = sc.Scene(CELL, PULL, sc.chain(2), initial={"x": [0.9, -0.9]})
+    scene = sc.Scene(CELL, PULL, sc.graphs.chain(2), initial={"x": [0.9, -0.9]})
     branch = sc.follow(sc.equilibrium(scene, K=0.4), "K", to=0.7)
     (born,) = branch.bifurcations
     assert born.kind == "branch point"
@@ -111,7 +111,7 @@ def test_folds_and_hopf_points_of_jansen_and_rit() -> None:
 
 
 def test_a_grid_of_machines_folds_with_a_neutral_shift() -> None:
-    scene = sc.Scene(MACHINE, LINE, sc.ring(5), parameters={"P": POWERS})
+    scene = sc.Scene(MACHINE, LINE, sc.graphs.ring(5), parameters={"P": POWERS})
     branch = sc.follow(sc.equilibrium(scene), "K", to=0.3)
     (fold,) = branch.bifurcations
     assert (str(fold.kind), branch.ends) == ("fold", ("K = 3",))
@@ -124,7 +124,7 @@ def test_a_grid_of_machines_folds_with_a_neutral_shift() -> None:
 
 def test_a_parameter_of_one_node_is_followed() -> None:
     """sin(delta_1 - delta_2) = (P_1 - P_2)/(2 K) in the frame of the pair."""
-    pair = sc.Scene(MACHINE, LINE, sc.chain(2), parameters={"P": [0.5, -0.5], "K": 1.0})
+    pair = sc.Scene(MACHINE, LINE, sc.graphs.chain(2), parameters={"P": [0.5, -0.5], "K": 1.0})
     branch = sc.follow(sc.equilibrium(pair), "P_1", to=3.0, values=[1.0])
     (fold,) = branch.bifurcations
     assert fold.value == pytest.approx(1.5, abs=1e-13)
@@ -137,7 +137,7 @@ def test_hopf_points_of_modes_in_closed_form() -> None:
     """FitzHugh-Nagumo with links in v: the mode lambda is neutral at v = -sqrt(.936 - D lambda)."""
     node = sc.Field({"v": "v - v**3/3 - w + I", "w": "2/25*(v + 7/10 - 4/5*w)"}, parameters={"I": 0.2})
     link = sc.Rates({"v": "D*W*(v_j - v_i)"}, {"D": 0.05})
-    scene = sc.Scene(node, link, sc.ring(4), initial={"v": -1.1, "w": -0.5})
+    scene = sc.Scene(node, link, sc.graphs.ring(4), initial={"v": -1.1, "w": -0.5})
     branch = sc.follow(sc.equilibrium(scene), "I", to=0.45)
     values = values_of(branch, "Hopf")
     np.testing.assert_allclose(values[:2], [0.331281337455, 0.391624018433], atol=1e-11)
@@ -151,7 +151,7 @@ def test_amplitude_death_is_bounded_by_hopf_points() -> None:
     rates = {"x": "x - w*y - (x**2 + y**2)*x", "y": "w*x + y - (x**2 + y**2)*y"}
     node = sc.Field(rates, parameters={"w": 1})
     link = sc.Rates({"x": "K*W*(x_j - x_i)", "y": "K*W*(y_j - y_i)"}, {"K": 0.5})
-    scene = sc.Scene(node, link, sc.chain(2), initial={"x": 0, "y": 0}, parameters={"w": [2.5, -0.5]})
+    scene = sc.Scene(node, link, sc.graphs.chain(2), initial={"x": 0, "y": 0}, parameters={"w": [2.5, -0.5]})
     branch = sc.follow(sc.equilibrium(scene), "K", to=2.0)
     np.testing.assert_allclose(values_of(branch, "Hopf"), [1.0, 1.625], atol=1e-12)
     assert [each.multiplicity for each in branch.bifurcations] == [2, 1]

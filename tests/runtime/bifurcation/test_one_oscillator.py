@@ -11,7 +11,7 @@ import sympy as sp
 import synchain as sc
 
 WELL = sc.Field({"x": "v", "v": "x - x**3 - (3/10 + x/5)*v + cos(t)/1000"})
-PAIR_OF_WELLS = sc.Scene(WELL, "x->v", sc.chain(2), initial={"x": -1, "v": 0})
+PAIR_OF_WELLS = sc.Scene(WELL, "x->v", sc.graphs.chain(2), initial={"x": -1, "v": 0})
 
 
 def lagrangian() -> sc.Lagrangian:

@@ -31,14 +31,14 @@ def in_units(state: np.ndarray, scene: sc.Scene) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def plain() -> tuple[sc.PeriodicOrbit, sc.Branch]:
+def plain() -> tuple[sc.results.PeriodicOrbit, sc.results.Branch]:
     orbit = sc.periodic_orbit(duffing())
     return orbit, sc.follow(orbit, "F", values=[0.08, 0.1, 0.12])
 
 
 @pytest.mark.parametrize("units", UNITS)
 def test_orbits_and_branches_follow_the_units_of_state_and_time(
-    units: tuple[float, float, float, float], plain: tuple[sc.PeriodicOrbit, sc.Branch]
+    units: tuple[float, float, float, float], plain: tuple[sc.results.PeriodicOrbit, sc.results.Branch]
 ) -> None:
     orbit, branch = plain
     scene = duffing(*units)
@@ -110,16 +110,16 @@ def test_an_undriven_oscillator_is_told_what_is_possible() -> None:
 
 
 def test_lines_of_a_branch_end_at_its_bifurcations_and_are_of_one_stability(
-    plain: tuple[sc.PeriodicOrbit, sc.Branch],
+    plain: tuple[sc.results.PeriodicOrbit, sc.results.Branch],
 ) -> None:
     branch = plain[1]
     (line,) = stretches(branch)
     assert line[0] is True
     np.testing.assert_array_equal(line[1], [0.08, 0.1, branch.bifurcations[0].value])
     orbit = branch.orbits[0]
-    lost = sc.PeriodicOrbit(orbit.scene, 1, orbit.state, np.array([-1.5, 0.1]), 0.0, 1)
+    lost = sc.results.PeriodicOrbit(orbit.scene, 1, orbit.state, np.array([-1.5, 0.1]), 0.0, 1)
     turn = branch.bifurcations[0]
-    crossed = sc.Branch(
+    crossed = sc.results.Branch(
         "F",
         np.array([0.08, 0.1, 0.12, 0.14]),
         (orbit, orbit, lost, lost),
@@ -153,7 +153,9 @@ FIELDS = {
 }  # fmt: skip
 
 
-def test_every_field_of_a_scene_is_obeyed_refused_or_of_no_matter(plain: tuple[sc.PeriodicOrbit, sc.Branch]) -> None:
+def test_every_field_of_a_scene_is_obeyed_refused_or_of_no_matter(
+    plain: tuple[sc.results.PeriodicOrbit, sc.results.Branch],
+) -> None:
     orbit, _ = plain
     calls = {
         "periodic_orbit": lambda scene: sc.periodic_orbit(scene).state,

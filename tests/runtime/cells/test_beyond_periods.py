@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synchain import Field, Scene, chain, run
+from synchain import Field, Scene, run
+from synchain.graphs import chain
 
 PERIOD = 2.0 * np.pi / 1.3
 DRIVEN = Field({"x": "v", "v": "-x - delta*v + u*cos(omega*t)"}, parameters={"delta": 0.0, "u": 0.5, "omega": 1.3})

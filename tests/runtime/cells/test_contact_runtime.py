@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from synchain.models import Scene, topology
-from synchain.runtime import Criterion, Status, open_result, run, thresholds
+from synchain import Criterion, Scene, open_result, run, thresholds
+from synchain.graphs import topology
+from synchain.results import Status
 from synchain.runtime.cells.reduce import explain, reduce_scene
 from synchain.runtime.plots.result_plot import draw_result
 

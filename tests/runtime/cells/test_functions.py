@@ -57,7 +57,7 @@ def test_functions_without_a_value_by_their_formula_run_from_there(integrator: s
     link = sc.Rates({"x": "W*(1/exprel(x_i) - log1p(x_j**2) + mod(k, 2))"}, {"k": 3.5})
     settings = {"transient": 0.0, "window": 6.0, "time_unit": "time", "rtol": 1e-10, "integrator": integrator}
     settings["initial"] = {"x": 0.0}
-    result = sc.run(sc.Scene(node, link, sc.chain(2), **settings), show_progress=False)
+    result = sc.run(sc.Scene(node, link, sc.graphs.chain(2), **settings), show_progress=False)
 
     def rate(t: float, x: np.ndarray) -> np.ndarray:
         return -np.expm1(x) / 2 + 9 * np.cos(t) - 3 + 1 / exprel(x) - np.log1p(x[::-1] ** 2) + 1.5

@@ -10,8 +10,9 @@ import sympy as sp
 from sympy.physics.mechanics import dynamicsymbols
 
 import synchain as sc
-from synchain.models import Oscillator, Scene
+from synchain import Scene
 from synchain.models.definitions.loader import load_oscillator
+from synchain.plugins import Oscillator
 from synchain.runtime.cli import main
 from synchain.runtime.engines.scene_kernels import kernel_source
 
@@ -63,17 +64,20 @@ def lorenz() -> Oscillator:
 
 
 PAIRS = {
-    "friction": (Scene(rubbing("atan"), topology=sc.chain(2)), Scene(topology=sc.chain(2))),
+    "friction": (Scene(rubbing("atan"), topology=sc.graphs.chain(2)), Scene(topology=sc.graphs.chain(2))),
     "set-valued": (
-        Scene(rubbing("set-valued"), topology=sc.chain(2), record=["section"], **SHORT),
-        Scene(contact="set-valued", topology=sc.chain(2), record=["section"], **SHORT),
+        Scene(rubbing("set-valued"), topology=sc.graphs.chain(2), record=["section"], **SHORT),
+        Scene(contact="set-valued", topology=sc.graphs.chain(2), record=["section"], **SHORT),
     ),
-    "duffing": (Scene(duffing(), "spring", sc.chain(3), **SHORT), Scene("duffing", "spring", sc.chain(3), **SHORT)),
+    "duffing": (
+        Scene(duffing(), "spring", sc.graphs.chain(3), **SHORT),
+        Scene("duffing", "spring", sc.graphs.chain(3), **SHORT),
+    ),
     "double pendulum": (
-        Scene(double_pendulum(), "spring on phi", sc.chain(2)),
-        Scene("double_pendulum", "spring on phi", sc.chain(2)),
+        Scene(double_pendulum(), "spring on phi", sc.graphs.chain(2)),
+        Scene("double_pendulum", "spring on phi", sc.graphs.chain(2)),
     ),
-    "lorenz": (Scene(lorenz(), "x->x", sc.ring(4)), Scene("lorenz", "x->x", sc.ring(4))),
+    "lorenz": (Scene(lorenz(), "x->x", sc.graphs.ring(4)), Scene("lorenz", "x->x", sc.graphs.ring(4))),
 }
 
 

@@ -10,9 +10,10 @@ import xarray as xr
 from samples import source_of
 
 from benchmarks import skip as bench
-from synchain.models import Axis, Scene, chain, from_matrix, ring, star
+from synchain import Axis, Scene, kernel, run
+from synchain.graphs import chain, from_matrix, ring, star
 from synchain.models.dynamics import reduction as reduction_module
-from synchain.runtime import Result, Status, kernel, run
+from synchain.results import Result, Status
 from synchain.runtime.cells import reduce as skip_module
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.reduce import explain, reduce_scene

@@ -18,10 +18,12 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import Scene, chain, load_scene, scene_names
+from synchain import Scene, load_scene, open_result, scene_names
+from synchain.graphs import chain
 from synchain.models.graphs.families import names as families
 from synchain.models.scenes.schema import schema
-from synchain.runtime import ExponentWindows, commands, open_result
+from synchain.results import ExponentWindows
+from synchain.runtime import commands
 from synchain.runtime.cli import main
 from synchain.runtime.console.outcome import print_json
 from synchain.runtime.engines import job, scene_kernels

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from synchain.models import scene_names
+from synchain import scene_names
 from synchain.models.graphs.families import names as families
 from synchain.runtime.cli import main
 from synchain.runtime.commands import names as commands

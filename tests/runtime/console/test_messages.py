@@ -13,9 +13,10 @@ import pytest
 from catalogue import PAIR
 from test_load import SOURCE
 
+from synchain import run
 from synchain.codegen.machine_code import compile as loading
 from synchain.models.presentation.writer import Latex
-from synchain.runtime import cli, run
+from synchain.runtime import cli
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.cli import main
 from synchain.runtime.console.arguments import spaced

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from synchain.models import Scene, chain, load_scene
+from synchain import Scene, load_scene, msf, open_result, run
+from synchain.graphs import chain
 from synchain.models.graphs.families import names as families
-from synchain.runtime import PeriodicOrbit, Result, msf, open_result, run
+from synchain.results import PeriodicOrbit, Result
 from synchain.runtime.cli import main
 from synchain.runtime.commands import names as commands
 from synchain.runtime.commands.list import LISTS

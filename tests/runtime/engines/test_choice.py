@@ -10,8 +10,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from synchain.models import Field, Scene, chain
-from synchain.runtime import Status, run
+from synchain import Field, Scene, run
+from synchain.graphs import chain
+from synchain.results import Status
 from synchain.runtime.cells.plan import CellRows
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.engines.choice import chosen_for_rows

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from synchain import Field, Scene
 from synchain.codegen.driver.columns import Count, SpanColumn, SumColumn
-from synchain.models import Field, Scene
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.plan import CellRows
 from synchain.runtime.cells.reduce import reduce_scene

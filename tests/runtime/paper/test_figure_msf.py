@@ -12,8 +12,9 @@ import pytest
 from figure_samples import TINY, Simulation, drawn, parabola, rows, words
 from matplotlib.colors import to_rgba
 
-from synchain.models import Scene, chain, complete, load_scene
-from synchain.runtime import MSF, Plane
+from synchain import Scene, load_scene
+from synchain.graphs import chain, complete
+from synchain.results import MSF, Plane
 from synchain.runtime.paper import exponent_figure, load, plane_figure, synchronisability_map
 from synchain.runtime.paper.figure_runs import QUICK, FigureRuns, Quality
 from synchain.runtime.paper.make import make

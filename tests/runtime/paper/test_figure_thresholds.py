@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from figure_samples import TINY, Simulation, drawn, rows, words
 
-from synchain.models import chain, load_scene
-from synchain.runtime import ExponentWindows
+from synchain import load_scene
+from synchain.graphs import chain
+from synchain.results import ExponentWindows
 from synchain.runtime.paper import load, published
 from synchain.runtime.paper import threshold_table as tables_of_thresholds
 from synchain.runtime.paper.figure_runs import QUICK, FigureRuns

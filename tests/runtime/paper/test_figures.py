@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 from figure_samples import TINY, Simulation, drawn, pretend, rows, words
 
-from synchain.models import Scene, load_scene, scene_names
-from synchain.runtime import Status, run
+from synchain import Scene, load_scene, run, scene_names
+from synchain.results import Status
 from synchain.runtime.paper import load, names, projection, sync_error
 from synchain.runtime.paper import make as maker
 from synchain.runtime.paper.figure_runs import FULL, QUICK, FigureRuns, Quality, thin

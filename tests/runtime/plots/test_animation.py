@@ -9,7 +9,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from synchain.models import Scene, chain, ring
+from synchain import Scene
+from synchain.graphs import chain, ring
 from synchain.runtime.plots.style import BLUE, ORANGE
 from synchain.runtime.sweeps.run import run
 

@@ -17,7 +17,8 @@ from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
-from synchain.models import Scene, Topology, from_matrix, load_scene, topology, union
+from synchain import Scene, load_scene
+from synchain.graphs import Topology, from_matrix, topology, union
 from synchain.runtime.plots.graph_layout import positions
 from synchain.runtime.plots.graph_picture import NEGATIVE, Picture, svg
 
@@ -155,7 +156,7 @@ def test_a_large_graph_is_words_in_html_and_quick(graph: Topology) -> None:
 
 def test_matplotlib_is_loaded_by_drawing_alone() -> None:
     code = (
-        "import sys\nfrom synchain.models import chain, load_scene\n"
+        "import sys\nfrom synchain import load_scene; from synchain.graphs import chain\n"
         "chain(4)._repr_html_(), load_scene('figure_4a')._repr_html_()\nassert 'numba' not in sys.modules\n"
         "assert 'matplotlib' not in sys.modules\nchain(4).draw()\nassert 'matplotlib' in sys.modules"
     )

@@ -12,9 +12,10 @@ import pytest
 from figure_samples import pretend, words
 from matplotlib.axes import Axes
 
-from synchain.models import Scene, chain, load_scene
+from synchain import Scene, load_scene, periodic_orbit, run
+from synchain.graphs import chain
 from synchain.models.dynamics.equations import Equations
-from synchain.runtime import Result, periodic_orbit, run
+from synchain.results import Result
 from synchain.runtime.plots import result_plot, style
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from catalogue import nameless_one_way_ring
 
-from synchain.models import Topology, topology
+from synchain.graphs import Topology, topology
 from synchain.runtime.prediction.intervals import intersect
 from synchain.runtime.prediction.synchronisability import windows, windows_complex
 

@@ -12,7 +12,7 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synchain.models import Topology, from_matrix, topology
+from synchain.graphs import Topology, from_matrix, topology
 from synchain.models.algebra.roots import RealRoot
 from synchain.models.spectra.eigenvalue import Eigenvalue
 from synchain.models.spectra.eigenvalue_order import compare

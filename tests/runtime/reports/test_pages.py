@@ -12,8 +12,8 @@ import pytest
 from kept_values import every_kind
 from matplotlib.axes import Axes
 
-from synchain.models import Scene, Topology, load_scene, topology
-from synchain.runtime import run
+from synchain import Scene, load_scene, run
+from synchain.graphs import Topology, topology
 from synchain.runtime.reports.html import ROWS
 
 NAME = '<b onclick="x">&'

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from synchain.models import Field, Scene, load_scene, topology
-from synchain.runtime import msf, run
+from synchain import Field, Scene, load_scene, msf, run
+from synchain.graphs import topology
 from synchain.runtime.cli import main
 from synchain.runtime.reports.html import provenance_rows
 from synchain.runtime.reports.scene_report import Effort, _ends, report

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from synchain.models import Field, Scene, topology
-from synchain.runtime import Status, SweepFailed, SweepInterrupted, exponents, open_result, run, stream
+from synchain import Field, Scene, exponents, open_result, run, stream
+from synchain.graphs import topology
+from synchain.results import Status, SweepFailed, SweepInterrupted
 from synchain.runtime.results.certificate import NEAR, VERDICTS, Certificate
 from synchain.runtime.sweeps import certify as certification
 from synchain.runtime.sweeps.certify import certify

@@ -17,8 +17,8 @@ import xarray as xr
 from kept_values import PAIR, every_kind
 
 import synchain.runtime
-from synchain.models import topology
-from synchain.runtime import open_result, run, stream
+from synchain import open_result, run, stream
+from synchain.graphs import topology
 from synchain.runtime.results.labelled import Labelled
 from synchain.runtime.results.store import FORMS as KNOWN
 
@@ -64,7 +64,7 @@ def differences(first: Any, second: Any, where: str = "") -> list[str]:
 
 def test_every_kind_is_among_the_values() -> None:
     """A result that is new gets data, a plot and a file, or this fails."""
-    offered = [getattr(synchain.runtime, name) for name in synchain.runtime.__all__]
+    offered = [getattr(synchain.results, name) for name in synchain.results.__all__]
     kinds = {kind.__name__ for kind in offered if isinstance(kind, type) and issubclass(kind, Labelled)}
     assert kinds == {*KINDS, "Result", "Streamed"}
 

@@ -7,8 +7,7 @@ import pytest
 import sympy as sp
 
 from benchmarks.energy import CASES
-from synchain.models import Scene, load_scene
-from synchain.runtime import run
+from synchain import Scene, load_scene, run
 from synchain.runtime.results.energy_of_states import energy_function
 
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from synchain.models import Scene, chain
-from synchain.runtime import Result, Status, open_result, run
+from synchain import Scene, open_result, run
+from synchain.graphs import chain
+from synchain.results import Result, Status
 
 
 @cache

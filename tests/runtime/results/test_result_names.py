@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from synchain import Field, Rates, Scene, follow, plane, run, skeleton
 from synchain.codegen.driver.columns import SpanColumn
-from synchain.models import Field, Rates, Scene, chain, normal
+from synchain.draw import normal
+from synchain.graphs import chain
 from synchain.models.inputs.names import ATTRIBUTES, TAKEN
-from synchain.runtime import PeriodicOrbit, Result, Skeleton, follow, plane, run, skeleton
+from synchain.results import PeriodicOrbit, Result, Skeleton
 from synchain.runtime.bifurcation import results
 from synchain.runtime.bifurcation.kinds import BifurcationKind
 from synchain.runtime.bifurcation.results import Bifurcation

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from synchain.models import Scene, chain, ring
-from synchain.runtime import PeriodicOrbit, kernel
+from synchain import Scene, kernel
+from synchain.graphs import chain, ring
+from synchain.results import PeriodicOrbit
 from synchain.runtime.bifurcation.kinds import BifurcationKind
 from synchain.runtime.bifurcation.results import Bifurcation
 from synchain.runtime.prediction.synchronisability import verdict, windows

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from synchain.models import Scene, chain
-from synchain.runtime import cluster_exponents, exponents, lyapunov_spectrum, thresholds
+from synchain import Scene, cluster_exponents, exponents, lyapunov_spectrum, thresholds
+from synchain.graphs import chain
 from synchain.runtime.stability.averages import FEWEST, FIRST, MOST, Averaging, Batches
 from synchain.runtime.stability.exponents import average, initial_states
 from synchain.runtime.stability.march import March, interpolation_for

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import Field, Rates, Scene, Topology, clusters, from_matrix, topology
+from synchain import Field, Rates, Scene, cluster_exponents, exponents, run
+from synchain.graphs import Topology, clusters, from_matrix, topology
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import clustered
-from synchain.runtime import ClusterExponents, cluster_exponents, exponents, run
+from synchain.results import ClusterExponents
 
 pytestmark = pytest.mark.long
 

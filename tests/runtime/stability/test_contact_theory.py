@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
-from synchain.models import Scene, allow_code, topology
-from synchain.runtime import Result, exponents, run
+from synchain import Scene, exponents, run
+from synchain.graphs import topology
+from synchain.plugins import allow_code
+from synchain.results import Result
 from synchain.runtime.stability.orbits import OrbitProblem
 
 ONE = topology("chain", 1)
@@ -122,7 +124,7 @@ def test_free_decay(hold: float) -> None:
 
 BELT_DAMPER = """
 # Stender & Hoffmann, Nonlinear Dynamics 107, 1451 (2022): block on a belt with a spring and a damper to the ground
-from synchain.models import Lagrangian
+from synchain import Lagrangian
 
 OSCILLATOR = Lagrangian("v**2/2", "x**2/2", {"x": "friction(theta_b - v) - 2*xi*v"}, coordinates={"x": "v"},
                         parameters={"theta_b": 1.5, "xi": 0.05})

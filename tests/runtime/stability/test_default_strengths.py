@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from synchain.models import Scene, chain
+from synchain import Scene, msf
+from synchain.graphs import chain
 from synchain.models.scenes.file import load_scene
-from synchain.runtime import msf
 from synchain.runtime.cli import main
 from synchain.runtime.stability.msf import default_strengths
 

@@ -31,14 +31,14 @@ def test_a_loose_tolerance_is_in_the_error(what: str) -> None:
 
 def test_a_whole_spectrum_knows_the_error_of_its_steps() -> None:
     """All exponents of an oscillator without damping are zero."""
-    scene = sc.Scene("harmonic", topology=sc.chain(2), integrator="taylor")
+    scene = sc.Scene("harmonic", topology=sc.graphs.chain(2), integrator="taylor")
     result = sc.lyapunov_spectrum(scene, rtol=1e-5, periods=50, precision=0.0)
     assert np.abs(result.exponent).max() > 1e-9
     assert np.all(np.abs(result.exponent) <= 2.0 * result.stderr)
 
 
 def test_cluster_exponents_know_the_error_of_their_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = sc.Scene("harmonic", topology=sc.chain(3), parameters={"sigma": 0.1})
+    scene = sc.Scene("harmonic", topology=sc.graphs.chain(3), parameters={"sigma": 0.1})
     options = {"periods": 64, "transient": 0, "precision": 0.0}
     collected, errors = [], []
     measured = VariationalIntegrator.error_of_steps

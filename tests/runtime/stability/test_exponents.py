@@ -13,8 +13,9 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from synchain.models import Field, Rates, Scene, ends, topology
-from synchain.runtime import Exponents, exponents, lyapunov_spectrum, msf, plane
+from synchain import Field, Rates, Scene, ends, exponents, lyapunov_spectrum, msf, plane
+from synchain.graphs import topology
+from synchain.results import Exponents
 from synchain.runtime.stability.averages import Batches
 from synchain.runtime.stability.interpolation import strength_interpolation
 from synchain.runtime.stability.msf import classify

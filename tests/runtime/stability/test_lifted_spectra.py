@@ -19,7 +19,7 @@ def stuart_landau(n: int) -> sc.Scene:
     node = sc.Field({"x": "x - y - (x**2 + y**2)*(x - y/2)", "y": "y + x - (x**2 + y**2)*(y + x/2)"})
     i, j, W = sc.ends(node)
     turned = {i.x: KAPPA * W * (j.x - i.x - B * (j.y - i.y)), i.y: KAPPA * W * (j.y - i.y + B * (j.x - i.x))}
-    return sc.Scene(node, sc.Rates(turned, {"kap": 0.3, "b": -1.0}), sc.ring(n), initial={"x": 1.0, "y": 0.0})
+    return sc.Scene(node, sc.Rates(turned, {"kap": 0.3, "b": -1.0}), sc.graphs.ring(n), initial={"x": 1.0, "y": 0.0})
 
 
 def of_modes(n: int) -> np.ndarray:
@@ -30,11 +30,11 @@ def of_modes(n: int) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def ring() -> sc.Lyapunov:
+def ring() -> sc.results.Lyapunov:
     return sc.lyapunov_spectrum(stuart_landau(16), transient=20, periods=30, rtol=1e-8)
 
 
-def test_the_ring_of_sixteen_has_the_exponents_of_its_modes(ring: sc.Lyapunov) -> None:
+def test_the_ring_of_sixteen_has_the_exponents_of_its_modes(ring: sc.results.Lyapunov) -> None:
     """The second one by 30 digits: -0.0241115514; the sum is the divergence, 16 (2 - 4 - 1.2)."""
     exact = of_modes(16)
     assert exact[1] == pytest.approx(-0.0241115514, abs=1e-10)
@@ -45,7 +45,7 @@ def test_the_ring_of_sixteen_has_the_exponents_of_its_modes(ring: sc.Lyapunov) -
     assert ring.divergence == pytest.approx(-51.2, abs=1e-7)
 
 
-def test_the_largest_exponents_alone(ring: sc.Lyapunov) -> None:
+def test_the_largest_exponents_alone(ring: sc.results.Lyapunov) -> None:
     few = sc.lyapunov_spectrum(stuart_landau(16), count=3, transient=40, periods=30, rtol=1e-8)
     np.testing.assert_allclose(few.exponent, ring.exponent[:3], atol=1e-6)
     assert np.isnan(few.divergence)
@@ -53,7 +53,7 @@ def test_the_largest_exponents_alone(ring: sc.Lyapunov) -> None:
 
 
 @pytest.mark.parametrize(
-    "scene", [sc.Scene("lorenz", "x->x", sc.chain(2)), sc.Scene("duffing", None)], ids=["lorenz", "duffing"]
+    "scene", [sc.Scene("lorenz", "x->x", sc.graphs.chain(2)), sc.Scene("duffing", None)], ids=["lorenz", "duffing"]
 )
 @pytest.mark.parametrize("parts", [1, 8])
 def test_both_kernels_agree(scene: sc.Scene, parts: int) -> None:
@@ -85,7 +85,7 @@ def test_a_pendulum_at_rest_has_the_eigenvalues_of_its_mass_matrix() -> None:
 def test_exponents_of_a_conservative_pendulum_come_in_pairs() -> None:
     """Two pendula of four links, whose masses depend on the angles: 16 exponents in pairs, and chaos."""
     scene = sc.Scene(
-        pendulum(4), "spring on q1", sc.chain(2), initial={"q1": [1.0, 0.5], "q4": [2.0, -1.0]},
+        pendulum(4), "spring on q1", sc.graphs.chain(2), initial={"q1": [1.0, 0.5], "q4": [2.0, -1.0]},
         parameters={"delta": 0.0, "sigma": 0.5},
     )  # fmt: skip
     result = sc.lyapunov_spectrum(scene, transient=10, periods=100, rtol=1e-8)
@@ -98,7 +98,7 @@ def test_two_kinds_of_oscillators_in_two_layers() -> None:
     """Linear equations: the exponents are the real parts of the eigenvalues."""
     fast = {"oscillator": sc.Field({"x": "-3*x"}, initial={"x": 1.0}), "at": [1]}
     slow = {"oscillator": sc.Field({"x": "w", "w": "-x - w/5"}, initial={"x": 1.0}), "at": [2, 3]}
-    scene = sc.Scene(nodes=[fast, slow], coupling="x->x", topology=sc.chain(3), parameters={"sigma": 0.5})
+    scene = sc.Scene(nodes=[fast, slow], coupling="x->x", topology=sc.graphs.chain(3), parameters={"sigma": 0.5})
     result = sc.lyapunov_spectrum(scene, transient=40, periods=60)
     matrix = np.array(
         [
@@ -115,9 +115,9 @@ def test_two_kinds_of_oscillators_in_two_layers() -> None:
 
 def test_what_is_refused() -> None:
     with pytest.raises(ValueError, match="found set-valued friction; expected smooth rates; use contact 'atan'"):
-        sc.lyapunov_spectrum(sc.Scene(topology=sc.chain(9), contact="set-valued"))
+        sc.lyapunov_spectrum(sc.Scene(topology=sc.graphs.chain(9), contact="set-valued"))
     with pytest.raises(ValueError, match="count = 33; expected 1 … 32"):
         sc.lyapunov_spectrum(stuart_landau(16), count=33)
     node = sc.Field({"x": "v", "v": "-x**3 + v/2"}, initial={"x": 1.0})
     with pytest.raises(FloatingPointError, match="the state grew without bound"):
-        sc.lyapunov_spectrum(sc.Scene(node, "x->v", sc.ring(9)), count=2)
+        sc.lyapunov_spectrum(sc.Scene(node, "x->v", sc.graphs.ring(9)), count=2)

@@ -13,8 +13,8 @@ import pytest
 from catalogue import VAN_DER_POL
 from scipy.integrate import solve_ivp
 
-from synchain.models import Field, Scene, chain
-from synchain.runtime import exponents, follow, msf, open_result, periodic_orbit
+from synchain import Field, Scene, exponents, follow, msf, open_result, periodic_orbit
+from synchain.graphs import chain
 from synchain.runtime.stability.orbits import OrbitProblem
 
 

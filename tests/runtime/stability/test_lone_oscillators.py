@@ -9,7 +9,7 @@ import pytest
 
 import synchain as sc
 
-LONE, PAIR = sc.Scene("fitzhugh_nagumo"), sc.Scene("fitzhugh_nagumo", "x->x", sc.chain(2))
+LONE, PAIR = sc.Scene("fitzhugh_nagumo"), sc.Scene("fitzhugh_nagumo", "x->x", sc.graphs.chain(2))
 
 
 def test_strength_zero_needs_no_link() -> None:

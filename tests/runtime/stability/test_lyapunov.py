@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import Field, Scene, from_matrix, topology
+from synchain import Field, Scene, exponents, lyapunov_spectrum, run
+from synchain.graphs import from_matrix, topology
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import PHASE, network_variation, phase_shifted, with_volume
 from synchain.models.mechanics.components import Node
-from synchain.runtime import Lyapunov, exponents, lyapunov_spectrum, run
+from synchain.results import Lyapunov
 from synchain.runtime.stability.tangent_frame import TangentFrame
 
 pytestmark = pytest.mark.long

@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from synchain.models import Scene, topology
+from synchain import Scene
+from synchain.graphs import topology
 from synchain.runtime.stability.averages import BATCHES, FIRST, Batches
 from synchain.runtime.stability.interpolation import Interpolation, exact_interpolation, strength_interpolation
 from synchain.runtime.stability.march import MODE_TOLERANCE_RATIO, BlockInterpolation, March, interpolation_for

@@ -10,9 +10,9 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from synchain.models import Rates, Scene, Topology, chain, circulant, complete, ends, from_matrix, ring, star, topology
+from synchain import Rates, Scene, ends, exponents, msf, open_result, plane, run
+from synchain.graphs import Topology, chain, circulant, complete, from_matrix, ring, star, topology
 from synchain.models.definitions.loader import load_oscillator
-from synchain.runtime import exponents, msf, open_result, plane, run
 from synchain.runtime.stability.interpolation import exact_interpolation, strength_interpolation
 from synchain.runtime.stability.march import BlockInterpolation, March
 from synchain.runtime.stability.orbits import OrbitProblem

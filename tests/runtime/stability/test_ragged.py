@@ -10,14 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from synchain.models import Scene, allow_code, topology
-from synchain.runtime import exponents, run
+from synchain import Scene, exponents, run
+from synchain.graphs import topology
+from synchain.plugins import allow_code
 from synchain.runtime.stability.msf import classify
 
 pytestmark = pytest.mark.long
 
 UEDA = """
-from synchain.models import Lagrangian
+from synchain import Lagrangian
 
 # Ueda, J. Stat. Phys. 20, 181 (1979)
 OSCILLATOR = Lagrangian("v**2/2", "x**4/4 - u*x*cos(omega*t)", {"x": "-h*v"}, coordinates={"x": "v"},

@@ -7,8 +7,8 @@ import warnings
 import numpy as np
 import pytest
 
-from synchain.models import Field, Scene, chain
-from synchain.runtime import exponents, lyapunov_spectrum
+from synchain import Field, Scene, exponents, lyapunov_spectrum
+from synchain.graphs import chain
 from synchain.runtime.stability.motion import RateFunctions, rests
 
 VAN_DER_POL = Field({"x": "v/T0", "v": "(-x + (1 - x**2)*v)/T0"}, parameters={"T0": 1.0}, initial={"x": 1.0, "v": 0.0})

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synchain.models import Field, Rates, Scene, from_edges
-from synchain.runtime import equilibrium, lyapunov_spectrum
+from synchain import Field, Rates, Scene, equilibrium, lyapunov_spectrum
+from synchain.graphs import from_edges
 from synchain.runtime.stability.orbits import OrbitProblem
 
 ROSSLER = Field(

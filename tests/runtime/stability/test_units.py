@@ -7,8 +7,9 @@ import warnings
 import numpy as np
 import pytest
 
-from synchain.models import Field, Scene, chain
-from synchain.runtime import MSF, Exponents, exponents, msf, plane
+from synchain import Field, Scene, exponents, msf, plane
+from synchain.graphs import chain
+from synchain.results import MSF, Exponents
 from synchain.runtime.stability.attractor import Attractor, Motion
 from synchain.runtime.stability.exponents import group_by_attractor
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synchain.models import Scene, topology
-from synchain.runtime import run
+from synchain import Scene, run
+from synchain.graphs import topology
 from synchain.runtime.results.certificate import SYNCHRONOUS, VERDICTS
 from synchain.runtime.sweeps.certify import certify
 

@@ -11,8 +11,10 @@ import pytest
 from event_reference import Reference
 from mpmath import mp, mpf
 
-from synchain.models import Scene, Topology, allow_code, topology
-from synchain.runtime import Result, Status, run
+from synchain import Scene, run
+from synchain.graphs import Topology, topology
+from synchain.plugins import allow_code
+from synchain.results import Result, Status
 
 pytestmark = pytest.mark.long
 
@@ -177,7 +179,7 @@ def test_law_that_chatters_ends_with_its_status(tmp_path: Path) -> None:
     """Static friction below that of slow slip can neither hold the block nor let it go."""
     law = tmp_path / "weak_rest.py"
     law.write_text(
-        "from synchain.models import friction_law\n"
+        "from synchain import friction_law\n"
         "FRICTION = friction_law('mu_k*sign(w)', {'mu_k': 0.5, 'mu_s': 0.3}, static='mu_s')\n",
         encoding="utf-8",
     )

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from samples import kernel, run_cells
 
-from synchain.models import Scene, topology
-from synchain.runtime import Status, run
+from synchain import Scene, run
+from synchain.graphs import topology
+from synchain.results import Status
 from synchain.runtime.cells.initial_modes import with_modes
 from synchain.runtime.cli import main
 

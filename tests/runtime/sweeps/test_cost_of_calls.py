@@ -12,7 +12,7 @@ import xarray as xr
 from effort import effort
 
 import synchain as sc
-from synchain.runtime import run
+from synchain import run
 from synchain.runtime.engines import choice
 from synchain.runtime.engines.choice import at_start
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synchain.models import Field, Rates, Scene, chain
-from synchain.runtime import run
+from synchain import Field, Rates, Scene, run
+from synchain.graphs import chain
 
 STIFFNESS = np.array([1e2, 1e3, 1e4, 1e6, 1e9, 1e12])
 RECORDS = {"record": ("sync_error", "section", "trajectory"), "section": "x_1 falling", "samples": 200}

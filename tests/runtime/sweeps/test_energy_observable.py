@@ -8,26 +8,13 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain import erdos_renyi, one_way_ring
-from synchain.models import (
-    Lagrangian,
-    Potential,
-    Rates,
-    Scene,
-    chain,
-    end,
-    ends,
-    energy,
-    maximum,
-    mean,
-    minimum,
-    nodes,
-    ring,
-    uniform,
-)
+from synchain import Lagrangian, Potential, Rates, Scene, ends
+from synchain.draw import uniform
+from synchain.graphs import chain, erdos_renyi, one_way_ring, ring
 from synchain.models.definitions.loader import load_oscillator
 from synchain.models.networks.energy_terms import EnergyTerms
-from synchain.models.scenes.energy import energy as energy_of
+from synchain.models.scenes.energy import energy_terms as energy_of
+from synchain.observe import end, energy, maximum, mean, minimum, nodes
 from synchain.runtime.engines.scene_kernels import kernel_source
 from synchain.runtime.results.energy_of_states import energy_function
 from synchain.runtime.sweeps.run import run

@@ -18,9 +18,10 @@ import numpy as np
 import pytest
 from streams import MAP, UP, partial, warm
 
+from synchain import Scene, open_result, run, stream
 from synchain.codegen.machine_code.installation import InstallationError
-from synchain.models import Scene, cartesian, chain
-from synchain.runtime import Result, SweepFailed, open_result, run, stream
+from synchain.graphs import cartesian, chain
+from synchain.results import Result, SweepFailed
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.engines.job import JobSpec, SweepSpec
 from synchain.runtime.engines.scene_kernels import write_kernel
@@ -253,7 +254,7 @@ MPI = """
 import sys
 from mpi4py.futures import MPIPoolExecutor
 from streams import MAP
-from synchain.runtime import run
+from synchain import run
 if __name__ == "__main__":
     with MPIPoolExecutor() as executor:
         run(MAP, executor=executor, workers=2, show_progress=False).save(sys.argv[1])

@@ -38,7 +38,7 @@ def test_phases_at_high_frequency_move_as_in_the_frame_that_turns_along(method: 
     frequencies = np.array([-0.5, 0.25, 0.125, 0.75])
     ends = [
         sc.run(
-            sc.Scene(phases, push, sc.ring(4), parameters={"omega": list(frequencies + shift)}, **common)
+            sc.Scene(phases, push, sc.graphs.ring(4), parameters={"omega": list(frequencies + shift)}, **common)
         ).end.values.reshape(-1)
         for shift in (0.0, 1e7)
     ]

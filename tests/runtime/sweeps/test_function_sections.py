@@ -9,9 +9,11 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from synchain.models import Scene, Section, chain, mean, nodes, ring
+from synchain import Scene, Section, open_result, run, stream
+from synchain.graphs import chain, ring
 from synchain.models.mechanics.components import TIME
-from synchain.runtime import Result, Status, open_result, run, stream
+from synchain.observe import mean, nodes
+from synchain.results import Result, Status
 
 x, v, x_1, x_2 = sp.symbols("x v x_1 x_2")
 TIMES = {"transient": 2.0, "window": 20.0, "time_unit": "time"}

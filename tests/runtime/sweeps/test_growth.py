@@ -19,7 +19,7 @@ TAYLOR = FREE | {"integrator": "taylor"}
     [(2, -1.0, 300_000), pytest.param(3, -2.0, 140_000, marks=pytest.mark.long), (4, -10.0, 300_000)],
 )
 def test_networks_that_drive_each_other_apart_end_long_before_their_budget(n: int, sigma: float, most: int) -> None:
-    scene = sc.Scene("rossler", "x->x", sc.chain(n), window=1000, **TAYLOR)
+    scene = sc.Scene("rossler", "x->x", sc.graphs.chain(n), window=1000, **TAYLOR)
     result = sc.run(scene, sigma=sigma)
     assert result.status == Status.DIVERGED
     assert result.steps < most
@@ -28,7 +28,7 @@ def test_networks_that_drive_each_other_apart_end_long_before_their_budget(n: in
 
 
 def test_a_window_that_the_budget_reaches_is_integrated_to_its_end() -> None:
-    scene = sc.Scene("rossler", "x->x", sc.chain(2), window=40, **TAYLOR)
+    scene = sc.Scene("rossler", "x->x", sc.graphs.chain(2), window=40, **TAYLOR)
     result = sc.run(scene, sigma=-1.0)
     assert result.status == Status.FINISHED
     assert abs(result.end).max() > 1e4

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from streams import MAP, UP, warm
 
-from synchain.models import load_scene
-from synchain.runtime import Status, merge, open_result, stream
+from synchain import load_scene, merge, open_result, stream
+from synchain.results import Status
 from synchain.runtime.cells.layout import Layout
 from synchain.runtime.cli import main
 from synchain.runtime.results.block_log import BlockLog

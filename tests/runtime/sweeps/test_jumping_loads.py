@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from synchain import Lagrangian, Scene, friction_law
-from synchain.models import chain
+from synchain.graphs import chain
 from synchain.runtime.sweeps.run import run
 
 LOAD, LIMIT = 0.2, 0.3

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synchain.models import Scene, chain, ring
-from synchain.runtime import run
+from synchain import Scene, run
+from synchain.graphs import chain, ring
 
 SLOW: dict[str, object] = {"kappa": 10.0, "sigma": 0.1, "theta_b": 0.02}
 """Over a slow belt every oscillator passes |w| = 0 twice a period."""

@@ -9,8 +9,9 @@ import pytest
 from catalogue import VAN_DER_POL
 from scipy.integrate import solve_ivp
 
-from synchain.models import Field, Scene, chain
-from synchain.runtime import Result, Status, run
+from synchain import Field, Scene, run
+from synchain.graphs import chain
+from synchain.results import Result, Status
 
 QUIET: dict[str, Any] = {"show_progress": False}
 SHORT: dict[str, Any] = {"transient": 0.0, "time_unit": "time"}

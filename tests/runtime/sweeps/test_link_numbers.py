@@ -14,25 +14,25 @@ import sympy as sp
 from catalogue import LAGGING, PHASE
 from scipy.integrate import solve_ivp
 
-from synchain import erdos_renyi, one_way_ring
-from synchain.models import (
+from synchain import (
     Field,
     Potential,
     Rates,
     Scene,
-    Topology,
-    chain,
-    complete,
+    cluster_exponents,
     ends,
-    from_edges,
-    normal,
-    ring,
-    uniform,
+    exponents,
+    lyapunov_spectrum,
+    msf,
+    plane,
+    thresholds,
+    universal_probe,
 )
+from synchain.draw import normal, uniform
+from synchain.graphs import Topology, chain, complete, erdos_renyi, from_edges, one_way_ring, ring
 from synchain.models.definitions.loader import load_oscillator
 from synchain.models.inputs.names import LinkName
 from synchain.models.scenes.file import load_scene
-from synchain.runtime import cluster_exponents, exponents, lyapunov_spectrum, msf, plane, thresholds, universal_probe
 from synchain.runtime.results.open import open_result
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import stream

@@ -11,10 +11,11 @@ import sympy as sp
 from catalogue import BODY, ROTOR
 from scipy.integrate import solve_ivp
 
-from synchain.models import Field, Oscillator, Parameter, Potential, Rates, Scene, Topology, complete, ends, ring, star
+from synchain import Field, Parameter, Potential, Rates, Scene, ends, run
+from synchain.graphs import Topology, complete, ring, star
 from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.mechanics.oscillator import FieldModel
-from synchain.runtime import run
+from synchain.plugins import Oscillator
 
 K, LAG, OMEGA, G, VS, LAM, TH, GE = sp.symbols("K lag Omega g V_s lam Theta g_el")
 P, X, Y, Z = sp.symbols("p x y z", real=True)

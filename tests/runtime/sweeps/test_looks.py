@@ -15,7 +15,7 @@ import synchain as sc
 x_1 = sp.Symbol("x_1")
 CIRCLE = sc.Scene(
     sc.Field({"x": "y", "y": "-x"}), initial={"x": [0.0], "y": [1.0]}, transient=0, window=50, time_unit="time",
-    record=("trajectory",), samples=2, observe={"height": sc.end(sp.Symbol("x"))}, rtol=1e-10,
+    record=("trajectory",), samples=2, observe={"height": sc.observe.end(sp.Symbol("x"))}, rtol=1e-10,
 )  # fmt: skip
 """Its stops, sections and records are those of test_stop: the tests share drivers."""
 METHODS = [("taylor", 1), ("dop853", 4)]
@@ -86,7 +86,7 @@ def test_rounding_is_no_passage(integrator: str, width: int) -> None:
         "1e8*nodes.std(x)", "x_1 + v_1 - x_2 - v_2",
     ]  # fmt: skip
     pair = sc.Scene(
-        "van_der_pol", "spring", sc.chain(2), initial={"x": 1.0, "v": 0.0}, parameters={"sigma": 0.3}, transient=0, window=50,
+        "van_der_pol", "spring", sc.graphs.chain(2), initial={"x": 1.0, "v": 0.0}, parameters={"sigma": 0.3}, transient=0, window=50,
         time_unit="time", record=(), integrator=integrator, stop="v_1 - v_2 - 3/10*(x_1 - x_2)",
         sections={f"s{k}": sc.Section(function, "both", keep="x") for k, function in enumerate(zeros)},
     )  # fmt: skip

@@ -18,13 +18,13 @@ from synchain.runtime.engines.scene_kernels import chosen_integrator, kernel_sou
 
 THETA, K = sp.symbols("theta K")
 HERE, THERE, W = sc.ends(PHASE)
-ORDER = sc.end(abs(sc.nodes.mean(sp.exp(sp.I * THETA))))
+ORDER = sc.observe.end(abs(sc.observe.nodes.mean(sp.exp(sp.I * THETA))))
 LARGE = 2001
 """Nodes whose links are more than can be listed."""
 
 
-def mean_field(n: int) -> sc.Topology:
-    return sc.weighted(sc.complete(n), f"1/{n}")
+def mean_field(n: int) -> sc.graphs.Topology:
+    return sc.graphs.weighted(sc.graphs.complete(n), f"1/{n}")
 
 
 def scene(n: int, coupling: object = LAGGING, **changes: object) -> sc.Scene:
@@ -56,7 +56,7 @@ def test_two_hundred_phases_follow_scipy(integrator: str) -> None:
 
 def test_the_synchronisation_error_is_that_of_listed_links() -> None:
     field = scene(FEW + 1, integrator="dop853", record=("sync_error",))
-    listed = field.replace(topology=sc.from_matrix(field.topology.matrix))
+    listed = field.replace(topology=sc.graphs.from_matrix(field.topology.matrix))
     assert (len(field.equations.fields), len(listed.equations.fields)) == (1, 0)
     error, expected = (float(sc.run(each, width=1).data.sync_error) for each in (field, listed))
     assert error == pytest.approx(expected, rel=1e-9)
@@ -69,8 +69,8 @@ def test_small_complete_graphs_list_their_links() -> None:
 
 
 def test_set_valued_friction_lists_its_links() -> None:
-    assert sc.Scene(topology=sc.complete(9), contact="set-valued").equations.fields == ()
-    assert len(sc.Scene(topology=sc.complete(9)).equations.fields) == 1
+    assert sc.Scene(topology=sc.graphs.complete(9), contact="set-valued").equations.fields == ()
+    assert len(sc.Scene(topology=sc.graphs.complete(9)).equations.fields) == 1
 
 
 def test_a_scene_of_many_phases_lists_no_link(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -128,10 +128,10 @@ def test_layers_beside_a_mean_field_keep_their_links() -> None:
     ring = sc.Rates({HERE.theta: sp.Symbol("c") * W * sp.sin(THERE.theta - HERE.theta) ** 3}, {"c": 0.4})
     settings = {"parameters": {"K": 1.5, "omega": np.linspace(-1, 1, n)}, "initial": {"theta": np.linspace(0, 5, n)}}
     more = {"transient": 0, "window": 1, "time_unit": "time", "integrator": "taylor", "rtol": 1e-11, "record": ()}
-    both = sc.Scene(PHASE, links=[(LAGGING, mean_field(n)), (ring, sc.ring(n))], **settings, **more)
+    both = sc.Scene(PHASE, links=[(LAGGING, mean_field(n)), (ring, sc.graphs.ring(n))], **settings, **more)
     assert (len(both.equations.fields), len(both.equations.listed)) == (1, 1)
-    listed = sc.Topology("listed", n, tuple(AllPairs(n, mean_field(n).all_to_all)))
-    same = sc.Scene(PHASE, links=[(LAGGING, listed), (ring, sc.ring(n))], **settings, **more)
+    listed = sc.graphs.Topology("listed", n, tuple(AllPairs(n, mean_field(n).all_to_all)))
+    same = sc.Scene(PHASE, links=[(LAGGING, listed), (ring, sc.graphs.ring(n))], **settings, **more)
     assert same.equations.fields == ()
     assert both.topology.link_count == n * (n - 1)
     np.testing.assert_allclose(sc.run(both).states("end"), sc.run(same).states("end"), atol=1e-10)

@@ -13,9 +13,11 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 from scipy.special import ive
 
-from synchain.models import Field, Scene, chain, complete, end, maximum, mean, minimum, nodes, rate, ring, variance
+from synchain import Field, Scene, open_result, run, stream
+from synchain.graphs import chain, complete, ring
 from synchain.models.mechanics.components import TIME
-from synchain.runtime import Result, Status, open_result, run, stream
+from synchain.observe import end, maximum, mean, minimum, nodes, rate, variance
+from synchain.results import Result, Status
 from synchain.runtime.cells.reduce import as_reduction
 
 x, v, x_1, v_1, theta, t = sp.symbols("x v x_1 v_1 theta t")

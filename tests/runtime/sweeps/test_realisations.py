@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import Scene, chain, end, lorentzian, mean, nodes, normal, rate, ring, uniform
+from synchain import Scene, open_result, run, stream
+from synchain.draw import lorentzian, normal, uniform
+from synchain.graphs import chain, ring
 from synchain.models.sweeps.distribution import Draw
-from synchain.runtime import open_result, run, stream
+from synchain.observe import end, mean, nodes, rate
 
 x = sp.Symbol("x")
 SCENE = Scene(

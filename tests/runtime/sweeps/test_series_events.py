@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from samples import run_cells
 
+from synchain import Scene
 from synchain.codegen.driver.columns import Count
 from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.machine_code.compile import load
-from synchain.models import Scene, chain
+from synchain.graphs import chain
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.engines.scene_kernels import chosen_integrator
 from synchain.runtime.sweeps.run import run

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from synchain.models import Field, Scene, topology
-from synchain.runtime import Result, open_result, run
+from synchain import Field, Scene, open_result, run
+from synchain.graphs import topology
+from synchain.results import Result
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.results.labels import DRIVE_PHASE
 

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import Scene, end, mean, nodes, rate, ring
-from synchain.runtime import Status, open_result, run
+from synchain import Scene, open_result, run
+from synchain.graphs import ring
+from synchain.observe import end, mean, nodes, rate
+from synchain.results import Status
 
 x, v, x_1, t = sp.symbols("x v x_1 t")
 START = {"x": [1.0], "v": [0.0]}

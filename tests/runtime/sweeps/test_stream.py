@@ -19,8 +19,9 @@ import pytest
 from streams import MAP, PAIR, UP, kill_again_and_again, partial, warm
 from test_skip import MIRRORED
 
-from synchain.models import Scene, allow_code
-from synchain.runtime import Status, SweepFailed, SweepInterrupted, open_result, run, stream
+from synchain import Scene, open_result, run, stream
+from synchain.plugins import allow_code
+from synchain.results import Status, SweepFailed, SweepInterrupted
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.commands.run import stopped_by_signals
@@ -545,7 +546,7 @@ def test_other_versions_do_not_go_on_with_a_run(tmp_path, monkeypatch, interrupt
         stream(MAP, path, resume=True, show_progress=False)
 
 
-FALLING = """from synchain.models import Field
+FALLING = """from synchain import Field
 OSCILLATOR = Field({"x": "-rate*x"}, parameters={"rate": 1.0})
 """
 

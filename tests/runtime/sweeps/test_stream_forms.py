@@ -16,8 +16,8 @@ import pytest
 import xarray as xr
 from streams import MAP, PAIR, UP, contents, die_at_the_copy, forking, kill_again_and_again, partial, warm
 
-from synchain.models import Scene
-from synchain.runtime import Status, SweepFailed, SweepInterrupted, open_result, run, stream
+from synchain import Scene, open_result, run, stream
+from synchain.results import Status, SweepFailed, SweepInterrupted
 from synchain.runtime.cli import main
 from synchain.runtime.commands.run import FORMATS
 from synchain.runtime.results import store

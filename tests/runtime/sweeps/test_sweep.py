@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from synchain.models import Scene, chain
+from synchain import Scene, kernel, open_result, run, stream
+from synchain.graphs import chain
 from synchain.models.dynamics.reduction import without_drive
-from synchain.runtime import Status, SweepInterrupted, kernel, open_result, run, stream
+from synchain.results import Status, SweepInterrupted
 from synchain.runtime.cells.plan import plan
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.engines.step_control import tolerances

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import benchmarks
-from synchain.models import Scene, from_matrix, topology
-from synchain.runtime import Criterion, Exponents, exponents, run
+from synchain import Criterion, Scene, exponents, run
+from synchain.graphs import from_matrix, topology
+from synchain.results import Exponents
 from synchain.runtime.synchronisation.agreement import CAUSES, OUTCOMES, Cell, _cause, _outcome, agreement, strengths
 
 pytestmark = pytest.mark.long

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from kept_values import basin as kept_basin
 
-from synchain.models import Field, Scene, chain
-from synchain.runtime import Basin, Criterion, Probe, Status, basin, universal_probe
+from synchain import Criterion, Field, Scene, basin, universal_probe
+from synchain.graphs import chain
+from synchain.results import Basin, Probe, Status
 from synchain.runtime.synchronisation.basin import Fate, random_starts
 
 FREE = Scene(oscillator="harmonic", topology=chain(2), parameters={"sigma": 0.0})

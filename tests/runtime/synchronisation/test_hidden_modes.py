@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from synchain.models import Field, Scene, chain, complete, grid, one_way_ring, ring, star
-from synchain.runtime import Criterion, thresholds
+from synchain import Criterion, Field, Scene, thresholds
+from synchain.graphs import chain, complete, grid, one_way_ring, ring, star
 from synchain.runtime.synchronisation.hidden_modes import hidden_modes
 
 PAIR = Field({"x": "-x", "y": "-y"})

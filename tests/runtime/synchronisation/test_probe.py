@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import Scene, chain, from_matrix
+from synchain import Criterion, Scene, run, universal_probe
+from synchain.graphs import chain, from_matrix
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import Edge, Node
-from synchain.runtime import Criterion, Status, run, universal_probe
+from synchain.results import Status
 from synchain.runtime.synchronisation.probe import MODE_ALPHA, MODE_BETA, ring_of_three
 from synchain.runtime.synchronisation.threshold import probe
 

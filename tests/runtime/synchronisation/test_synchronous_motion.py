@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from synchain.models import Field, Rates, Scene, chain, ends, from_matrix
-from synchain.runtime import Criterion, basin, thresholds, universal_probe
+from synchain import Criterion, Field, Rates, Scene, basin, ends, thresholds, universal_probe
+from synchain.graphs import chain, from_matrix
 from synchain.runtime.support.execution import Execution
 from synchain.runtime.synchronisation.agreement import agreement
 from synchain.runtime.synchronisation.basin import Fate

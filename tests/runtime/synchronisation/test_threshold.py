@@ -9,9 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from synchain import Criterion, Field, Scene, exponents, thresholds
 from synchain.codegen.driver.columns import Count, SumColumn
-from synchain.models import Field, Scene, chain, complete, from_matrix, star
-from synchain.runtime import MSF, Criterion, Exponents, ExponentWindows, Status, exponents, thresholds
+from synchain.graphs import chain, complete, from_matrix, star
+from synchain.results import MSF, Exponents, ExponentWindows, Status
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.plots.style import GREEN
 from synchain.runtime.support.execution import Execution

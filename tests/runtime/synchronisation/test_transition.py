@@ -6,8 +6,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from synchain.models import Field, Scene, chain, complete, from_edges, one_way_ring, ring, star
-from synchain.runtime import MSF, Transition, exponents, run, transition
+from synchain import Field, Scene, exponents, run, transition
+from synchain.graphs import chain, complete, from_edges, one_way_ring, ring, star
+from synchain.results import MSF, Transition
 from synchain.runtime.cli import main
 from synchain.runtime.stability.exponents import Exponents
 from synchain.runtime.synchronisation.transition import TransitionCheck

@@ -1,62 +1,26 @@
-# What `__init__.py` loads on first use; tests/test_front.py writes it with --update.
+# What the module loads on first use; tests/test_front.py writes this file with --update.
 from collections.abc import Iterable
 from typing import Literal, overload
 
-from .definitions.inline import Field as Field
-from .definitions.inline import Lagrangian as Lagrangian
-from .definitions.inline import friction_law as friction_law
-from .definitions.inline import link_energy as link_energy
-from .dynamics.observable import Observable as Observable
-from .dynamics.observable import end as end
-from .dynamics.observable import energy as energy
-from .dynamics.observable import maximum as maximum
-from .dynamics.observable import mean as mean
-from .dynamics.observable import minimum as minimum
-from .dynamics.observable import nodes as nodes
-from .dynamics.observable import rate as rate
-from .dynamics.observable import variance as variance
-from .graphs.families import Family as Family
-from .graphs.products import cartesian as cartesian
-from .graphs.products import complement as complement
-from .graphs.products import kronecker as kronecker
-from .graphs.products import union as union
-from .graphs.products import weighted as weighted
-from .graphs.readers import from_edges as from_edges
-from .graphs.readers import from_graph as from_graph
-from .graphs.readers import from_sparse as from_sparse
-from .graphs.readers import read_edges as read_edges
-from .graphs.readers import read_graphml as read_graphml
-from .graphs.symbolic import from_symbols as from_symbols
-from .graphs.topology import Topology as Topology
-from .graphs.topology import from_matrix as from_matrix
-from .graphs.topology import read_matrix as read_matrix
-from .inputs.expression_text import exprel as exprel
-from .inputs.options import integer_option as integer_option
-from .inputs.options import integers_option as integers_option
-from .inputs.options import probability_option as probability_option
-from .inputs.plugins import allow_code as allow_code
-from .interactions.ends import ends as ends
-from .interactions.interaction import Potential as Potential
-from .interactions.interaction import Rates as Rates
-from .mechanics.contact import FrictionLaw as FrictionLaw
-from .mechanics.oscillator import Oscillator as Oscillator
-from .mechanics.oscillator import friction as friction
-from .mechanics.parameter import Parameter as Parameter
-from .presentation.equations_text import latex as latex
-from .presentation.equations_text import text as text
-from .scenes.file import load_scene as load_scene
-from .scenes.file import scene_names as scene_names
-from .scenes.scene import Scene as Scene
-from .scenes.section import Section as Section
-from .spectra.joint import joint_spectrum as joint_spectrum
-from .spectra.spectrum import Spectrum as Spectrum
-from .sweeps.axis import Axis as Axis
-from .sweeps.distribution import lorentzian as lorentzian
-from .sweeps.distribution import normal as normal
-from .sweeps.distribution import uniform as uniform
-from .symmetries.clusters import Clusters as Clusters
-from .symmetries.clusters import clusters as clusters
-from .symmetries.clusters import orbital_partitions as orbital_partitions
+from synchain.models.graphs.products import cartesian as cartesian
+from synchain.models.graphs.products import complement as complement
+from synchain.models.graphs.products import kronecker as kronecker
+from synchain.models.graphs.products import union as union
+from synchain.models.graphs.products import weighted as weighted
+from synchain.models.graphs.readers import from_edges as from_edges
+from synchain.models.graphs.readers import from_graph as from_graph
+from synchain.models.graphs.readers import from_sparse as from_sparse
+from synchain.models.graphs.readers import read_edges as read_edges
+from synchain.models.graphs.readers import read_graphml as read_graphml
+from synchain.models.graphs.symbolic import from_symbols as from_symbols
+from synchain.models.graphs.topology import Topology as Topology
+from synchain.models.graphs.topology import from_matrix as from_matrix
+from synchain.models.graphs.topology import read_matrix as read_matrix
+from synchain.models.spectra.joint import joint_spectrum as joint_spectrum
+from synchain.models.spectra.spectrum import Spectrum as Spectrum
+from synchain.models.symmetries.clusters import Clusters as Clusters
+from synchain.models.symmetries.clusters import clusters as clusters
+from synchain.models.symmetries.clusters import orbital_partitions as orbital_partitions
 
 @overload
 def topology(

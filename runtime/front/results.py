@@ -1,0 +1,33 @@
+"""Classes of results, for annotations and ; functions return them."""
+
+from __future__ import annotations
+
+from .offers import offer
+
+HOMES = {
+    "Basin": "runtime.synchronisation.basin",
+    "Bifurcation": "runtime.bifurcation.results",
+    "Branch": "runtime.bifurcation.results",
+    "ClusterExponents": "runtime.stability.cluster_exponents",
+    "Equilibrium": "runtime.bifurcation.equilibrium",
+    "ExponentWindows": "runtime.synchronisation.exponent_windows",
+    "Exponents": "runtime.stability.exponents",
+    "Lyapunov": "runtime.stability.lyapunov",
+    "MSF": "runtime.stability.msf",
+    "PeriodicOrbit": "runtime.bifurcation.periodic",
+    "Plane": "runtime.stability.msf",
+    "Probe": "runtime.synchronisation.probe",
+    "Progress": "runtime.support.progress",
+    "Result": "runtime.results.result",
+    "Skeleton": "runtime.bifurcation.skeleton",
+    "Status": "runtime.support.status",
+    "Streamed": "runtime.sweeps.stream",
+    "SweepFailed": "runtime.sweeps.errors",
+    "SweepInterrupted": "runtime.sweeps.errors",
+    "Thresholds": "runtime.synchronisation.threshold",
+    "Transition": "runtime.synchronisation.transition",
+    "TransitionCheck": "runtime.synchronisation.transition",
+}
+
+__all__ = list(HOMES)
+__getattr__, __dir__ = offer(__name__, HOMES)

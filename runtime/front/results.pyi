@@ -1,0 +1,23 @@
+# What the module loads on first use; tests/test_front.py writes this file with --update.
+from synchain.runtime.bifurcation.equilibrium import Equilibrium as Equilibrium
+from synchain.runtime.bifurcation.periodic import PeriodicOrbit as PeriodicOrbit
+from synchain.runtime.bifurcation.results import Bifurcation as Bifurcation
+from synchain.runtime.bifurcation.results import Branch as Branch
+from synchain.runtime.bifurcation.skeleton import Skeleton as Skeleton
+from synchain.runtime.results.result import Result as Result
+from synchain.runtime.stability.cluster_exponents import ClusterExponents as ClusterExponents
+from synchain.runtime.stability.exponents import Exponents as Exponents
+from synchain.runtime.stability.lyapunov import Lyapunov as Lyapunov
+from synchain.runtime.stability.msf import MSF as MSF
+from synchain.runtime.stability.msf import Plane as Plane
+from synchain.runtime.support.progress import Progress as Progress
+from synchain.runtime.support.status import Status as Status
+from synchain.runtime.sweeps.errors import SweepFailed as SweepFailed
+from synchain.runtime.sweeps.errors import SweepInterrupted as SweepInterrupted
+from synchain.runtime.sweeps.stream import Streamed as Streamed
+from synchain.runtime.synchronisation.basin import Basin as Basin
+from synchain.runtime.synchronisation.exponent_windows import ExponentWindows as ExponentWindows
+from synchain.runtime.synchronisation.probe import Probe as Probe
+from synchain.runtime.synchronisation.threshold import Thresholds as Thresholds
+from synchain.runtime.synchronisation.transition import Transition as Transition
+from synchain.runtime.synchronisation.transition import TransitionCheck as TransitionCheck
