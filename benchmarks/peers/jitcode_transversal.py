@@ -8,10 +8,7 @@ by a method of SciPy's ode.
 
 from __future__ import annotations
 
-import logging
-import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import chdir
 from typing import Any
 
 import numpy as np
@@ -19,6 +16,7 @@ import sympy as sp
 
 from synchain.models.scenes.scene import Scene
 
+from .jitcode_solvers import compile_c
 from .problem import Problem
 
 Growths = Callable[[float, np.ndarray, float, int], Iterator[float]]
@@ -50,11 +48,7 @@ def prepare(scene: Scene, method: str, rtol: float) -> Growths:
         control_pars=[symengine.Symbol(STRENGTH)],
         wants_jacobian=method == "lsoda",
     )
-    level = logging.root.level
-    with tempfile.TemporaryDirectory() as folder, chdir(folder):  # setuptools reads a pyproject.toml where it works
-        system.compile_C(extra_compile_args=["-O3", "-march=native", "-w"])
-    logging.root.setLevel(level)  # setuptools' own logging raises it
-
+    compile_c(system)
     # the class's own set_integrator hands `interpolate` on in the place of `nsteps`
     jitcode.set_integrator(system, method, nsteps=10_000_000, interpolate=False, rtol=rtol, atol=0.1 * rtol)
 
