@@ -25,6 +25,7 @@ from synchain.runtime.stability.msf import MSF, Plane
 from synchain.runtime.synchronisation.basin import Basin
 from synchain.runtime.synchronisation.criterion import PAPER
 from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
+from synchain.runtime.synchronisation.mismatch import Mismatch
 from synchain.runtime.synchronisation.probe import Probe
 from synchain.runtime.synchronisation.threshold import Sweep, Thresholds
 from synchain.runtime.synchronisation.transition import Transition, TransitionCheck
@@ -137,6 +138,7 @@ def every_kind() -> dict[str, Labelled]:
             np.ones((5, 2), int),
         ),
         thresholds(),
+        Mismatch(PAIR, ("x", "v"), np.array([-2.0]), np.ones(1), np.ones((1, 2)), np.array([-0.1]), np.ones(1)),
         transition(),
         TransitionCheck(transition(), np.array([[0.2, 0.4]]), np.array([[-0.1, np.nan]]), np.ones((1, 2)), ("w",)),
     )

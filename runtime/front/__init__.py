@@ -8,6 +8,7 @@
     msf, plane, exponents, cluster_exponents,
     lyapunov_spectrum                                stability of synchronous, clustered and other motion
     thresholds, transition, universal_probe, basin   strengths and starts that synchronise
+    mismatch                                         errors of nearly equal nodes
     equilibrium, periodic_orbit, follow, skeleton    states at rest, orbits, their branches and bifurcations
 
 The modules `graphs`, `observe`, `draw`, `export`, `plugins` and `results` hold the other names.  Each name is loaded
@@ -50,6 +51,7 @@ HOMES = {
     "load_scene": "models.scenes.file",
     "lyapunov_spectrum": "runtime.stability.lyapunov",
     "merge": "runtime.sweeps.merge",
+    "mismatch": "runtime.synchronisation.mismatch",
     "msf": "runtime.stability.msf",
     "open_result": "runtime.results.open",
     "periodic_orbit": "runtime.bifurcation.periodic",

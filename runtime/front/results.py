@@ -13,6 +13,7 @@ HOMES = {
     "ExponentWindows": "runtime.synchronisation.exponent_windows",
     "Exponents": "runtime.stability.exponents",
     "Lyapunov": "runtime.stability.lyapunov",
+    "Mismatch": "runtime.synchronisation.mismatch",
     "MSF": "runtime.stability.msf",
     "PeriodicOrbit": "runtime.bifurcation.periodic",
     "Plane": "runtime.stability.msf",

@@ -17,6 +17,7 @@ from synchain.runtime.sweeps.errors import SweepInterrupted as SweepInterrupted
 from synchain.runtime.sweeps.stream import Streamed as Streamed
 from synchain.runtime.synchronisation.basin import Basin as Basin
 from synchain.runtime.synchronisation.exponent_windows import ExponentWindows as ExponentWindows
+from synchain.runtime.synchronisation.mismatch import Mismatch as Mismatch
 from synchain.runtime.synchronisation.probe import Probe as Probe
 from synchain.runtime.synchronisation.threshold import Thresholds as Thresholds
 from synchain.runtime.synchronisation.transition import Transition as Transition

@@ -27,6 +27,7 @@ from ..stability.msf import MSF, Plane
 from ..sweeps.run import run
 from ..sweeps.stream import Streamed
 from ..synchronisation.basin import Basin, Fate
+from ..synchronisation.mismatch import Mismatch
 from ..synchronisation.probe import Probe
 from ..synchronisation.threshold import Thresholds
 from ..synchronisation.transition import Transition, TransitionCheck
@@ -336,5 +337,16 @@ def _(value: TransitionCheck, axes: Axes, **style: Any) -> Axes:
             look = line_style(style, marker="o", label=f"step {k + 1}")
             axes.errorbar(value.strength[k] / step.strength, value.exponent[k], 2 * value.stderr[k], **look)
     axes.set(xlabel="strength / predicted strength", ylabel="exponent of the cluster state per unit of time")
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4)
+    return axes
+
+
+@_draw.register
+def _(value: Mismatch, axes: Axes, **style: Any) -> Axes:
+    """Draw the part of each mode in the deviations over its eigenvalue."""
+    for k, name in enumerate(value.component):
+        parts = value.size * value.response[:, k] / np.sqrt(value.scene.n)
+        axes.plot(value.gamma, parts, **line_style(style, marker="o", linestyle="", label=symbol(name)))
+    axes.set(xlabel=symbol("gamma"), ylabel="root mean square of deviations", yscale="log")
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4)
     return axes
