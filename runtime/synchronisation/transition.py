@@ -31,6 +31,7 @@ from ..stability.averages import Averaging, document_keywords
 from ..stability.cluster_exponents import ClusterExponents, cluster_exponents
 from ..stability.exponents import initial_states
 from ..stability.msf import MSF, on_a_line
+from ..stability.transversal_modes import unused_axes
 from ..support.error_text import with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
@@ -440,7 +441,9 @@ def transition(
     >>> [step.clusters for step in sequence.steps]
     [((1, 2),), ((0, 1, 2, 3),)]
     """
+    given = Given(transition, parameters, more, ORBITS)
     graph = check_scene(scene).topology
+    given.expect_one_cell(scene, unused_axes(scene))
     if len(scene.model.linked) != 1:
         raise ValueError(f"transition: found {len(scene.model.linked)} layers of links; expected one")
     for eigenvalue in graph.spectrum:
@@ -454,7 +457,7 @@ def transition(
     averaging = Averaging.for_scene(
         scene, precision, periods, transient, seed, Execution(workers, None, show_progress, progress)
     )
-    function = on_a_line(Given(transition, parameters, more, ORBITS), scene, alpha, starts, rtol, averaging)
+    function = on_a_line(given, scene, alpha, starts, rtol, averaging)
     if not function.alpha[0] <= 0.0 < function.alpha[-1]:
         raise ValueError(
             f"transition: found alpha from {function.alpha[0]:g} to {function.alpha[-1]:g}; expected strengths from 0 on"
