@@ -3,9 +3,6 @@
 The unknowns are z = (x, s, p): state, speeds of the shifts, parameter.  The equations are r(x, p) = E s, where the
 columns of E are the shifts, and x = x_ref at one node of each shifted component.  A shift makes an eigenvalue zero; these
 are left out of the critical values.
-
-If all nodes are alike and links act by a Laplacian L, the Jacobian at equal states is A (x) I - H (x) L.  Its eigenvalues
-are those of A - lambda_k H for the eigenvalues lambda_k of L: small matrices for a network of any size.
 """
 
 from __future__ import annotations
@@ -14,7 +11,7 @@ from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg, sparse
+from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from synchain.models.dynamics.equations import Equations
@@ -23,7 +20,8 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.run_keywords import with_numbers
 from .arclength import Point
-from .equilibrium import Equilibrium, eigenvalues
+from .eigenvalues import ModeBlocks, eigenvalues
+from .equilibrium import Equilibrium
 from .kinds import BifurcationKind
 from .linearised import Linearised
 from .problems import Critical, Matrix
@@ -34,81 +32,8 @@ NOISE = 1e-14
 LEAST_SCALE = 0.1
 """Least scale of a component in lengths, relative to that of the largest component (a choice)."""
 
-BLOCKS = 1e-11
-"""Largest difference between a Jacobian and its blocks, relative to its largest entry (a choice)."""
-
 REAL = 1e-7
 """An eigenvalue whose imaginary part is smaller, relative to the largest, is real (a choice)."""
-
-
-class ModeBlocks:
-    """The eigenvalues of a network of equal nodes by small blocks, one for each mode of its graph."""
-
-    def __init__(self, equations: Equations) -> None:
-        (layer,) = equations.layers
-        self.n, self.components = equations.n, len(equations.node.state)
-        links = [*layer.links]
-        rows, columns = np.array([i for i, _, _ in links], dtype=int), np.array([j for _, j, _ in links], dtype=int)
-        weights = np.array([float(weight) for _, _, weight in links])
-        adjacency = sparse.csr_array((weights, (rows, columns)), (self.n, self.n))
-        degrees = np.asarray(adjacency.sum(axis=1)).ravel()
-        self.laplacian = sparse.csr_array(sparse.diags_array(degrees) - adjacency)
-        self.link = (int(rows[0]), int(columns[0]), float(adjacency[rows[0], columns[0]]), float(degrees[rows[0]]))
-
-    @classmethod
-    def of(cls, equations: Equations) -> ModeBlocks | None:
-        """Return the blocks of a network, None if its links or masses allow none."""
-        alike = not equations.mixed and not equations.differing and not equations.inertial
-        return cls(equations) if alike and len(equations.layers) == 1 and equations.link_count else None
-
-    @cached_property
-    def spectrum(self) -> tuple[np.ndarray, np.ndarray]:
-        """Eigenvalues (n,) and eigenvectors (n, n) of the Laplacian, ascending."""
-        matrix = self.laplacian.toarray()
-        if np.array_equal(matrix, matrix.T):
-            values, vectors = linalg.eigh(matrix)
-            values[np.abs(values) < 1e-13 * np.abs(values).max()] = 0.0
-            return values.astype(complex), vectors.astype(complex)
-        values, vectors = linalg.eig(matrix)
-        order = np.lexsort((values.imag, values.real))
-        return values[order], vectors[:, order]
-
-    @cached_property
-    def numbers(self) -> np.ndarray:
-        """Number (n,) of the distinct eigenvalue of each mode: 0 for that of equal states."""
-        values = self.spectrum[0]
-        apart = np.abs(np.diff(values)) > 1e-9 * max(1.0, float(np.abs(values).max()))
-        return np.concatenate([[0], np.cumsum(apart)])
-
-    def matrices(self, jacobian: sparse.csc_array) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return A and H (components, components) of a Jacobian A (x) I - H (x) L, None if it has another form."""
-        i, j, weight, degree = self.link
-        places = self.n * np.arange(self.components)
-        coupling = jacobian[np.ix_(places + i, places + j)].toarray() / weight
-        own = jacobian[np.ix_(places + i, places + i)].toarray() + degree * coupling
-        rebuilt = sparse.kron(own, sparse.eye_array(self.n)) - sparse.kron(coupling, self.laplacian)
-        difference = abs(jacobian - rebuilt).max()
-        return (own, coupling) if difference <= BLOCKS * abs(jacobian).max() else None
-
-    def values(self, jacobian: sparse.csc_array) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return all eigenvalues and the mode of each, None if the Jacobian has no blocks."""
-        matrices = self.matrices(jacobian)
-        if matrices is None:
-            return None
-        own, coupling = matrices
-        values = np.linalg.eigvals(own - self.spectrum[0][:, None, None] * coupling)
-        return values.ravel(), np.repeat(np.arange(self.n), self.components)
-
-    def text(self, mode: int) -> str:
-        """Describe a mode: its number, signs of a simple one on few nodes, eigenvalue."""
-        values, vectors = self.spectrum
-        number, eigenvalue = self.numbers[mode], values[mode]
-        signs = ""
-        if (self.numbers == number).sum() == 1 and self.n <= 12:
-            vector = (vectors[:, mode] / vectors[np.abs(vectors[:, mode]).argmax(), mode]).real
-            signs = " ".join("0" if abs(x) < 1e-9 else "+" if x > 0 else "-" for x in vector) + ", "
-        shown = eigenvalue.real if abs(eigenvalue.imag) < 1e-12 else eigenvalue
-        return f"mode {number} of the graph, {signs}eigenvalue {shown:.10g}"
 
 
 class Equilibria:

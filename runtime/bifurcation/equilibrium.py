@@ -26,8 +26,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import xarray as xr
-from scipy import linalg, sparse
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
+from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.reduction import without_drive
@@ -39,6 +39,7 @@ from ..cells.run_keywords import Given
 from ..results.labelled import Labelled, dataset, scene_text
 from ..results.labels import STATE, States
 from ..sweeps.continued_start import StartValue, started
+from .eigenvalues import ModeBlocks, eigenvalues
 from .linearised import Linearised
 
 MOST_STEPS, HALVINGS = 100, 40
@@ -68,16 +69,6 @@ SINGULAR, DAMPED = 1e-13, 1e-7
 largest. It
 is solved with the damping DAMPED. Regular directions change by DAMPED squared only, which is near rounding
 (choices)."""
-
-DENSE = 2000
-"""Most states of which all eigenvalues are computed: their dense matrix has 32 MB (a choice)."""
-
-FEW = 12
-"""Number of eigenvalues of larger networks, unless `count` is given (a choice)."""
-
-ASIDE = 1e-6
-"""Few eigenvalues are computed around this point, in units of the largest entry of J; 0 is an eigenvalue of each
-shift."""
 
 EVEN = 1e-15
 """Speed of a shift that is rounding, relative to the largest size of a rate's terms."""
@@ -278,7 +269,9 @@ def equilibrium(
         raise ValueError(f"count = {count}; expected at most {len(first)}, the states of the network")
     names, shifts = _shifts(scene, network, first)
     state, speeds, residual, steps = _solve(network, first, shifts)
-    values = eigenvalues(network.jacobian(state), network.mass(state), count)
+    jacobian, blocks = network.jacobian(state), None if count else ModeBlocks.of(scene.equations)
+    by_modes = None if blocks is None else blocks.values(jacobian)
+    values = eigenvalues(jacobian, network.mass(state), count) if by_modes is None else by_modes[0]
     values[np.abs(values) <= LEAST * _fastest(network, first, state)] = 0.0
     values = values[np.lexsort((-values.imag, -values.real))]
     return Equilibrium(scene, state, values, names, speeds, residual, steps)
@@ -508,24 +501,3 @@ def _solve_linear(matrix: sparse.csc_array, right: np.ndarray) -> np.ndarray:
     augmented = sparse.block_array([[damping, scaled], [scaled.T, -damping]], format="csc")
     both = splu(augmented).solve(np.append(rows * right, np.zeros(len(right))))
     return np.asarray(columns * both[len(right) :])
-
-
-def eigenvalues(jacobian: sparse.csc_array, mass: sparse.csc_array | None, count: int | None = None) -> np.ndarray:
-    """Return eigenvalues of M^-1 J, in any order: all up to DENSE states, or the `count` nearest to zero."""
-    size = jacobian.shape[0]
-    if count is None and size > DENSE:
-        count = FEW
-    if count is None or count >= size - 1:  # Arnoldi's method gives size - 2 at most
-        return np.asarray(linalg.eigvals(jacobian.toarray(), None if mass is None else mass.toarray()))
-    # Arnoldi's method on (J - a M)^-1 M: its largest eigenvalues 1/(lambda - a) belong to those nearest to a.
-    mass = sparse.eye_array(size, format="csc") if mass is None else mass
-    aside = ASIDE * float(abs(jacobian).max())
-    solver = splu(jacobian - aside * mass)
-    inverse = LinearOperator((size, size), matvec=lambda v: solver.solve(mass @ v), dtype=float)
-    try:
-        largest = eigs(inverse, count, v0=1.0 + np.arange(size) % 7, return_eigenvectors=False)
-    except ArpackNoConvergence:
-        raise ArithmeticError(
-            f"eigenvalues: the {count} nearest to zero of {size} did not converge; ask for another count"
-        ) from None
-    return np.asarray(aside + 1.0 / largest)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -66,9 +67,12 @@ class TemplateFunction:
     def of(cls, template: TermTemplate, dimension: int, blocks: Sequence[Block]) -> TemplateFunction:
         """Compile the rates of a template, and the blocks of a matrix, one for each array of indices."""
         symbols, indices = [*template.states, *template.others], template.indices
-        size = indices[0].shape[1]
         places = [
-            (k, i, j) for k, block in enumerate(blocks) for i in range(size) for j in range(size) if block[i][j] != 0
+            (k, i, j)
+            for k, block in enumerate(blocks)
+            for i, row in enumerate(block)
+            for j, entry in enumerate(row)
+            if entry != 0
         ]
         rows, columns = ([indices[0][:, i] for _, i, _ in places], [indices[k][:, j] for k, _, j in places])
         # Directions stand before the parameters; they are taken from the second half of the vector.
@@ -192,8 +196,8 @@ def term_size(e: sp.Expr, states: frozenset[sp.Symbol]) -> sp.Expr:
 
 def _slopes(template: TermTemplate) -> list[Block]:
     """Return the derivatives of the rates by the states of each array of indices."""
-    size = len(template.rates)
-    groups = [template.states[k : k + size] for k in range(0, len(template.states), size)]
+    ends = np.cumsum([0, *(each.shape[1] for each in template.indices)])
+    groups = [template.states[a:b] for a, b in pairwise(ends)]
     return [tuple(tuple(derivative(e, s) for s in group) for e in template.rates) for group in groups]
 
 

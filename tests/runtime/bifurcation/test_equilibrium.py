@@ -9,7 +9,7 @@ import pytest
 from scipy import sparse
 
 import synchain as sc
-from synchain.runtime.bifurcation import equilibrium as module
+from synchain.runtime.bifurcation import eigenvalues as module
 from synchain.runtime.bifurcation.linearised import Linearised
 
 MACHINE = sc.Field({"delta": "w", "w": "P - w/2"}, parameters={"P": 0})

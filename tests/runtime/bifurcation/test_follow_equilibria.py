@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 
 import synchain as sc
-from synchain.runtime.bifurcation import equilibria as module
+from synchain.runtime.bifurcation import eigenvalues as module
 from synchain.runtime.bifurcation.results import Branch
 
 CELL = sc.Field({"x": "x - x**3"})
