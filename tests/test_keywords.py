@@ -50,6 +50,7 @@ TAKEN = {
     "mismatch": CELLS,
     "cluster_exponents": ORBITS - {"workers"},
     "lyapunov_spectrum": ORBITS - {"workers"},
+    "equilibria": {"parameters"},
     "equilibrium": {"parameters"},
     "periodic_orbit": {"parameters", "periods"},
     "skeleton": {"show_progress", "progress", "parameters", "seed", "transient", "periods"},
@@ -97,6 +98,7 @@ def calls(scene: Scene, path: Any) -> dict[str, Callable[..., object]]:
         "mismatch": lambda **keywords: synchain.mismatch(scene, **keywords),
         "cluster_exponents": lambda **keywords: synchain.cluster_exponents(scene, [0, 0], **keywords),
         "lyapunov_spectrum": lambda **keywords: synchain.lyapunov_spectrum(scene, **keywords),
+        "equilibria": lambda **keywords: synchain.equilibria(scene, **keywords),
         "equilibrium": lambda **keywords: synchain.equilibrium(scene, **keywords),
         "periodic_orbit": lambda **keywords: synchain.periodic_orbit(scene, **keywords),
         "skeleton": lambda **keywords: synchain.skeleton(scene, "omega", [1.3], **keywords),
@@ -131,7 +133,7 @@ def test_every_function_refuses_in_one_line_what_is_no_parameter(name: str, tmp_
         *((n, w, "one orbit") for n in ("cluster_exponents", "lyapunov_spectrum") for w in ("workers", "executor")),
         *(
             (n, w, "needs the one before")
-            for n in ("equilibrium", "periodic_orbit", "skeleton")
+            for n in ("equilibria", "equilibrium", "periodic_orbit", "skeleton")
             for w in ("workers", "executor")
         ),
         *((name, "rtol", "rtol = 1e-12") for name in ("periodic_orbit", "skeleton")),

@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import xarray as xr
-from scipy import sparse
+from scipy import linalg, sparse
 from scipy.sparse.linalg import splu
 
 from synchain.models.dynamics.equations import Equations
@@ -80,6 +80,9 @@ error of
 
 LEAST = 1e-12
 """Size of an eigenvalue that is a rounding error, relative to the fastest rate (a choice)."""
+
+SMALL = 64
+"""Most unknowns of which the matrix is dense (a choice)."""
 
 BESIDE = 0.1
 """Relative distance at which slopes are measured beside a state: at a fold those at the state itself may vanish (a
@@ -267,7 +270,18 @@ def equilibrium(
     count = None if count is None else check_integer("count", count, 1)
     if count is not None and count > len(first):
         raise ValueError(f"count = {count}; expected at most {len(first)}, the states of the network")
-    names, shifts = _shifts(scene, network, first)
+    return near(scene, network, first, shifted_components(scene, network, first), count)
+
+
+def near(
+    scene: Scene,
+    network: Linearised,
+    first: np.ndarray,
+    shifted: tuple[tuple[str, ...], np.ndarray],
+    count: int | None = None,
+) -> Equilibrium:
+    """Find the equilibrium near a state with `count` eigenvalues; `shifted`: what `shifted_components` returns."""
+    names, shifts = shifted
     state, speeds, residual, steps = _solve(network, first, shifts)
     jacobian, blocks = network.jacobian(state), None if count else ModeBlocks.of(scene.equations)
     by_modes = None if blocks is None else blocks.values(jacobian)
@@ -318,7 +332,7 @@ def _fastest(network: Linearised, *states: np.ndarray) -> float:
     return max(sizes)
 
 
-def _shifts(scene: Scene, network: Linearised, state: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
+def shifted_components(scene: Scene, network: Linearised, state: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
     """Find components that can be shifted at all nodes together, and the vectors of ones (states, shifts) along them."""
     equations, jacobian, rates = scene.equations, network.jacobian(state), network.rates(state)
     # Row sums of |J|, the larger of those at the state and beside it.
@@ -483,16 +497,24 @@ def _solve(network: Linearised, first: np.ndarray, shifts: np.ndarray) -> tuple[
 def _solve_linear(matrix: sparse.csc_array, right: np.ndarray) -> np.ndarray:
     """Return the solution (k,) of linear equations, that of least squares and least norm if they are singular."""
     # Scale rows, then columns, to a largest entry of 1, so that pivots do not depend on the units of states and rates.
+    dense = len(right) <= SMALL  # sparse factors of small matrices spend their time in Python
+    array = matrix.toarray() if dense else abs(matrix)
     with np.errstate(divide="ignore"):
-        rows = 1.0 / abs(matrix).max(axis=1).toarray().ravel()
+        rows = 1.0 / (np.abs(array).max(axis=1) if dense else array.max(axis=1).toarray().ravel())
         rows = np.where(np.isfinite(rows), rows, 1.0)
-        columns = 1.0 / abs(sparse.diags_array(rows) @ matrix).max(axis=0).toarray().ravel()
+        array = rows[:, None] * array if dense else sparse.diags_array(rows) @ array
+        columns = 1.0 / (np.abs(array).max(axis=0) if dense else array.max(axis=0).toarray().ravel())
         columns = np.where(np.isfinite(columns), columns, 1.0)
+    if dense:
+        factors, places, _ = linalg.lapack.dgetrf(array * columns)
+        pivots = np.abs(factors.diagonal())
+        if pivots.min() > SINGULAR * pivots.max():
+            return np.asarray(columns * linalg.lapack.dgetrs(factors, places, rows * right)[0])
     scaled = sparse.csc_array(sparse.diags_array(rows) @ matrix @ sparse.diags_array(columns))
     try:
         solver = splu(scaled)
         pivots = np.abs(solver.U.diagonal())
-        if pivots.min(initial=1.0) > SINGULAR * pivots.max(initial=0.0):
+        if not dense and pivots.min(initial=1.0) > SINGULAR * pivots.max(initial=0.0):
             return np.asarray(columns * solver.solve(rows * right))
     except RuntimeError:  # a pivot is 0
         pass

@@ -9,7 +9,8 @@
     lyapunov_spectrum                                stability of synchronous, clustered and other motion
     thresholds, transition, universal_probe, basin   strengths and starts that synchronise
     mismatch                                         errors of nearly equal nodes
-    equilibrium, periodic_orbit, follow, skeleton    states at rest, orbits, their branches and bifurcations
+    equilibrium, equilibria, periodic_orbit, follow,
+    skeleton                                         states at rest, orbits, their branches and bifurcations
 
 The modules `graphs`, `observe`, `draw`, `export`, `plugins` and `results` hold the other names.  Each name is loaded
 when it is first used; editors read the names in the stubs beside this file.
@@ -39,6 +40,7 @@ HOMES = {
     "ends": "models.interactions.ends",
     "energy_terms": "models.scenes.energy",
     "energy_function": "runtime.results.energy_of_states",
+    "equilibria": "runtime.bifurcation.deflation",
     "equilibrium": "runtime.bifurcation.equilibrium",
     "exponents": "runtime.stability.exponents",
     "exprel": "models.inputs.expression_text",

@@ -23,6 +23,7 @@ from synchain.models.scenes.scene import Scene as Scene
 from synchain.models.scenes.section import Section as Section
 from synchain.models.sweeps.axis import Axis as Axis
 from synchain.runtime.bifurcation.branches import follow as follow
+from synchain.runtime.bifurcation.deflation import equilibria as equilibria
 from synchain.runtime.bifurcation.equilibrium import equilibrium as equilibrium
 from synchain.runtime.bifurcation.periodic import periodic_orbit as periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton as skeleton

@@ -210,3 +210,23 @@ def test_branches_open_as_they_were_saved(tmp_path: Path) -> None:
 def test_what_is_refused(name: str, options: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         sc.follow(sc.equilibrium(brusselators()), name, **options)
+
+
+@pytest.mark.parametrize(("K", "classes", "images"), [(0.2, 6, 9), (0.4, 4, 5), (0.6, 3, 3)])
+def test_all_equilibria_of_two_bistable_cells(K: float, classes: int, images: int) -> None:
+    """9 equilibria for K < 1/3, 5 to 1/2, then 3; those that differ by a swap of the cells are found once."""
+    found = sc.equilibria(sc.Scene(CELL, PULL, sc.graphs.chain(2), initial={"x": 1}), K=K)
+    assert len(found) == classes
+    assert sum(1 + (abs(each.state[0] - each.state[1]) > 1e-6) for each in found) == images
+    assert all(each.residual < 1e-12 for each in found)
+
+
+def test_equilibria_of_machines_differ_by_more_than_turns_and_shifts() -> None:
+    pair = sc.Scene(MACHINE, LINE, sc.graphs.chain(2), parameters={"P": [0.5, -0.5], "K": 1.0})
+    found = sc.equilibria(pair)
+    apart = sorted(abs(np.sin(each.state[0] - each.state[1])) for each in found)
+    np.testing.assert_allclose(apart, [0.5, 0.5], atol=1e-12)
+    assert sorted(each.stable for each in found) == [False, True]
+    assert len(sc.equilibria(pair, 1)) == 1
+    with pytest.raises(ValueError, match="equilibria: the range of delta is"):
+        sc.equilibria(pair, ranges={"delta": (1, 0)})
