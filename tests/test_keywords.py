@@ -375,7 +375,8 @@ OBEYED: dict[str, Any] = {
 RECORDED: dict[str, Any] = {
     "title": "another",
     "record": ("trajectory",),
-    "samples": 7,
+    "samples": None,
+    "t_eval": [5.5, 6.0, 6.9],
     "observe": {"e": "mean(x_1)"},
     "section": "v_1 rising",
     "sections": {"passed": {"function": "x_1"}},

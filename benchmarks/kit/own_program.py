@@ -59,7 +59,11 @@ def prepare(case: Case, integrator: str, width: int | None, readings: int = 0) -
         cells = len(ends)
         spans = np.ascontiguousarray(
             np.stack(
-                [np.zeros(cells), ends, *(np.full(cells, e) for e in (case.period, 0.0, FIRST_STEP, longest, np.inf))],
+                [
+                    np.zeros(cells),
+                    ends,
+                    *(np.full(cells, e) for e in (case.period, 0.0, FIRST_STEP, longest, np.inf, 1.0)),
+                ],
                 axis=1,
             )
         )

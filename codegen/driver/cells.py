@@ -62,7 +62,6 @@ def fill(lane, cell, rows, clock, y, dims):
     put(clock, CHANGE, lane, math.inf)
     put(clock, POWER, lane, 1.0)
     put(clock, LEFT, lane, -1.0)
-    put(clock, NEXT_SAMPLE, lane, spans[cell, 0])
     watch(lane, control, clock)
     begin(lane, cell, spans, clock)
     if idle:

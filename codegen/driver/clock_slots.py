@@ -26,13 +26,14 @@ TIME, STEP, STOP, START, END, MEMORY, CHANGE, ACCEPTED, REJECTED = 0, 1, 2, 3, 4
 SYNC, SYNC_SUM, SYNC_PEAK, NEXT_SAMPLE, BASE, PERIOD, PERIODS = 9, 10, 11, 12, 13, 14, 15
 LONGEST, LOOK, POWER, SAVED_AT, CYCLE, LEFT, SUM_BEFORE, SKIPPED, RUSH = 16, 17, 18, 19, 20, 21, 22, 23, 24
 HALTED, MARK, MARKED_AT, LAPSE, HIGH, RECORD, ORIGIN = 25, 26, 27, 28, 29, 30, 31
+# NEXT_SAMPLE is the index of the next sample of the trajectory.
 # Start and end of the window counted from t = 0; the period at whose end a step must stop; that end, if it is this period.
 FROM, UNTIL, DUE, BOUND, LOOKED_AT = 32, 33, 34, 35, 36
 CLOCK = 37
 # How a cell left its lane; a cell that pauses comes back, with this integrator or another one.
 FINISHED, BUDGET, UNDERFLOW, DIVERGED, INTERRUPTED, CHATTERING, STOPPED, PAUSED = 1, 2, 3, 4, 5, 6, 7, 8
 # Columns of `spans`: of a sweep, behind start, end, period and the error of synchronous cells.
-FIRST_OF_CELL, LONGEST_OF_CELL, FIRST_LOOK = 4, 5, 6
+FIRST_OF_CELL, LONGEST_OF_CELL, FIRST_LOOK, UNIT_OF_CELL = 4, 5, 6, 7
 # Columns of `control`, of `sums`, behind which stand the values that were observed for some time, and of `counts`.
 RTOL, ATOL, FIRST_STEP, MAX_STEP, MAX_STEPS, DIRECTION, CANCEL, NO_JUMPS, FURTHER = 0, 1, 2, 3, 4, 5, 6, 7, 8
 MEAN, PEAK, LAST, STOPPED_AT, OBSERVED = 0, 1, 2, 3, 4

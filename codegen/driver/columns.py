@@ -24,11 +24,14 @@ class Control(IntEnum):
     NO_JUMPS = 7
     """A number other than 0 integrates a cell that repeats itself to its end."""
     FURTHER = 8
-    """First entry beyond those of every kernel: the direction of the second section; those of further ones follow."""
+    """First entry beyond those of every kernel: the direction of the second section; those of further ones follow.
+
+    The last entries are the sample times, if they are not equally spaced.
+    """
 
 
 class SpanColumn(IntEnum):
-    """Columns of `spans` (cells, 7), in non-dimensional time."""
+    """Columns of `spans` (cells, 8), in non-dimensional time."""
 
     START = 0
     END = 1
@@ -41,6 +44,8 @@ class SpanColumn(IntEnum):
     """Longest step, so that no step misses a swing of the drive."""
     LOOK = 6
     """Steps after which the cell first tests whether to pause; inf without this test."""
+    UNIT = 7
+    """Unit of the sample times in `control`."""
 
 
 class SumColumn(IntEnum):

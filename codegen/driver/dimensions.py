@@ -32,7 +32,7 @@ class Dimensions(NamedTuple):
     kept: int
     """Most values that a point of a section on a function keeps; -1 if points are whole states."""
     sampled: int
-    """1 if the trajectory is recorded, else 0."""
+    """0 if no trajectory is recorded, 1 for equally spaced samples, 2 for samples at the times in `control`."""
     stops: int
     """1 if a function of the state ends a cell, else 0."""
 

@@ -24,7 +24,7 @@ class Rows(NamedTuple):
 
     start: Any  # (cells, dimension)
     values: Any  # (cells, parameters)
-    spans: Any  # (cells, 7), columns `SpanColumn`
+    spans: Any  # (cells, 8), columns `SpanColumn`
     control: Any  # columns `Control`
 
 

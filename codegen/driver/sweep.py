@@ -181,7 +181,7 @@ def drive(functions, dims, multiplicity, rule, network, first, last, inputs, out
         if dims.observed > 0 and any_lane(counted):
             functions.tally(lane_bits(counted), step, seen, cell, sums, steering, rule, dims, functions.values)
         if dims.sampled and any_lane(accept):
-            functions.sample(lane_bits(accept), t_new, step, clock, cell, spans, samples, dims)
+            functions.sample(lane_bits(accept), t_new, step, clock, cell, spans, samples, control, dims)
 
         # 6. Move the accepted lanes to the end of the step, and find the lanes that step 3 must look at.
         largest = advance(clock, y, t, t_new, accept, y_new, dims)

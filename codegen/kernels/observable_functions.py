@@ -85,6 +85,7 @@ class Recording:
     """The records of a kernel, and the functions of the state that it evaluates inside steps for them."""
 
     records: tuple[str, ...] = ("sync_error",)  # words of `Record`
+    own_times: bool = False  # whether the samples of the trajectory are at given times, not equally spaced
     section: sp.Expr | None = None  # section function of the record "section", whose points are whole states
     # values that are tallied over the window (`synchain.models.dynamics.observable`)
     observed: tuple[sp.Expr, ...] = ()

@@ -167,7 +167,7 @@ def emit(
             depths=count_of(equations, recording.depths),
             sections=len(recording.event_sections),
             kept=recording.kept,
-            sampled=int("trajectory" in recording.records),
+            sampled=int("trajectory" in recording.records) << int(recording.own_times),
             stops=int(recording.stop is not None),
         ),
         recording.multiplicity if compares and recording.multiplicity is not None else (1,) * equations.n,

@@ -57,7 +57,7 @@ def recorder_signatures(width: int) -> dict[str, Any]:
         "observe": types.void(mask, mask, step, *[ADDRESS] * 3, sizes),
         "cut": types.void(mask, step, ADDRESS, CELLS, COUNTS, CUBE, ADDRESS, MATRIX, sizes, function),
         "tally": types.void(INTEGER, step, ADDRESS, CELLS, MATRIX, ADDRESS, MATRIX, sizes, function),
-        "sample": types.void(INTEGER, lane, step, ADDRESS, CELLS, READ_ONLY, CUBE, sizes),
+        "sample": types.void(INTEGER, lane, step, ADDRESS, CELLS, READ_ONLY, CUBE, VECTOR, sizes),
     }
 
 

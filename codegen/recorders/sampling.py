@@ -7,17 +7,30 @@ import math
 import numpy as np
 from numba import njit
 
-from ..driver.clock_slots import BASE, END, NEXT_SAMPLE, WIDTH
+from ..driver.clock_slots import BASE, END, NEXT_SAMPLE, UNIT_OF_CELL, WIDTH
 from ..driver.dense import inside
 from ..simd.lanes import load, store
 
 
 # --- kernel text below ---
+@njit(error_model="numpy", forceinline=True)
+def sample_time(k, count, cell, spans, control, dims):
+    """Return the time of sample k of a cell, counted from t = 0; infinite behind the last sample."""
+    if not k < count:
+        return math.inf
+    begin, end = spans[cell, 0], spans[cell, 1]
+    if dims.sampled == 2:
+        return control[control.size - count + int(k)] * spans[cell, UNIT_OF_CELL]
+    if k + 1.0 == count and count > 1:
+        return end
+    return begin + k * ((end - begin) / (count - 1)) if count > 1 else begin
+
+
 @njit(error_model="numpy", cache=True)
-def sample(accepted, t_new, step, clock, cell, spans, samples, dims):
+def sample(accepted, t_new, step, clock, cell, spans, samples, control, dims):
     """Write the trajectory at the sample times inside the step, the next one of each lane at once."""
     reached, lengths, thetas = np.empty(WIDTH), np.empty(WIDTH), np.empty(WIDTH)
-    due, still = np.empty(WIDTH, np.int64), np.empty(WIDTH, np.int64)
+    due, count = np.empty(WIDTH, np.int64), samples.shape[1]
     store(reached, 0, t_new)
     store(lengths, 0, step.h)
     states = np.empty(dims.dimension * WIDTH)
@@ -34,19 +47,13 @@ def sample(accepted, t_new, step, clock, cell, spans, samples, dims):
         any_due = False
         for lane in range(WIDTH):
             thetas[lane], due[lane] = 1.0, -1
-            wanted = clock[NEXT_SAMPLE * WIDTH + lane]
+            following = clock[NEXT_SAMPLE * WIDTH + lane]
+            wanted = sample_time(following, count, cell[lane], spans, control, dims)
             if wanted > reached[lane]:
                 continue
-            begin, end = spans[cell[lane], 0], spans[cell[lane], 1]
-            gap = (end - begin) / (samples.shape[1] - 1) if samples.shape[1] > 1 else 0.0
-            k = round((wanted - begin) / gap) if gap > 0.0 else 0
-            if k >= samples.shape[1]:
-                continue
             any_due = True
-            thetas[lane], due[lane] = max(0.0, 1.0 - (reached[lane] - wanted) / lengths[lane]), k
-            following = begin + (k + 1) * gap if k + 2 != samples.shape[1] else end
-            still[lane] = samples.shape[1] if following <= wanted else k + 1  # all samples of a window without length
-            clock[NEXT_SAMPLE * WIDTH + lane] = following if still[lane] < samples.shape[1] else math.inf
+            thetas[lane], due[lane] = max(0.0, 1.0 - (reached[lane] - wanted) / lengths[lane]), int(following)
+            clock[NEXT_SAMPLE * WIDTH + lane] = following + 1.0
         if not any_due:
             return
         # write one sample of every lane that is due
@@ -54,4 +61,4 @@ def sample(accepted, t_new, step, clock, cell, spans, samples, dims):
             store(states, c, inside(load(thetas, 0, WIDTH), c, step.y, step.y_new, step.dense, dims))
             for lane in range(WIDTH):
                 if due[lane] >= 0:
-                    samples[cell[lane], due[lane] : still[lane], c] = states[c * WIDTH + lane]
+                    samples[cell[lane], due[lane], c] = states[c * WIDTH + lane]

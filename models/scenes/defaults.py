@@ -6,13 +6,14 @@ import pkgutil
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import sympy as sp
 
 from ..dynamics.record import Record
-from ..inputs.checks import check_choice, check_integer, check_number, check_text, short_repr
+from ..inputs.checks import check_choice, check_integer, check_number, check_text, is_row, short_repr
 from ..inputs.entry_points import announced
 from ..inputs.frozen import FrozenDict
 from ..inputs.words import Word
@@ -93,7 +94,8 @@ def complete(keywords: Mapping[str, Any]) -> dict[str, Any]:
         _check_graphs(model, differing)
     # Start, records and times.
     values["initial"] = _start(model, keywords["initial"], values["seed"])
-    values["record"] = _records(model, keywords["record"])
+    values["t_eval"] = _sample_times(keywords["t_eval"])
+    values["record"] = _records(model, keywords["record"], bool(values["t_eval"]))
     values["section"] = _section(model, keywords["section"])
     values["observe"] = observables(model, parameter_values, keywords["observe"])
     values["sections"] = sections(model, parameter_values, keywords["sections"])
@@ -105,7 +107,8 @@ def complete(keywords: Mapping[str, Any]) -> dict[str, Any]:
     recorded = (*values["record"], *values["observe"], *values["sections"])
     if recorded and values["window"] == 0.0:
         raise ValueError(f"window: found 0, in which {str(recorded[0])!r} has nothing to record; give a window > 0")
-    values |= _numerics(keywords, values["record"], values["window"])
+    _check_sample_times(values["t_eval"], values["transient"], values["window"])
+    values |= _numerics(keywords, values["record"], values["window"], len(values["t_eval"]))
     # Checks of several keywords together.
     values["continuation"] = check_sweep(model, values)
     check_draws(model, values, drawn)
@@ -186,8 +189,11 @@ def _start(model: Model, initial: object, seed: int) -> FrozenDict[tuple[float, 
     return chosen_start(initial, defaults, seed)
 
 
-def _records(model: Model, record: object) -> tuple[Record, ...]:
-    """Return the records in the order of `Record`; by default the synchronisation error if states can be compared."""
+def _records(model: Model, record: object, sampled: bool) -> tuple[Record, ...]:
+    """Return the records in the order of `Record`, with the trajectory if it is `sampled` at given times.
+
+    The default is the synchronisation error if states can be compared.
+    """
     n, common = model.n, bool(model.unlinked.common)
     listed = ((Record.SYNC_ERROR,) if n > 1 and common else ()) if record is None else record
     if not isinstance(listed, (list, tuple)):
@@ -201,7 +207,34 @@ def _records(model: Model, record: object) -> tuple[Record, ...]:
         )
     if Record.SYNC_ERROR in names and not common:
         raise ValueError("record: found 'sync_error', but these oscillators have no states of one name to compare")
+    names += [Record.TRAJECTORY] if sampled else []
     return tuple(name for name in Record if name in names)
+
+
+def _sample_times(times: object) -> tuple[float, ...]:
+    """Return the sample times; none if they are equally spaced."""
+    if times is None:
+        return ()
+    listed = times.tolist() if hasattr(times, "tolist") else times
+    if not is_row(listed):
+        raise TypeError(f"t_eval: found {short_repr(times)}; expected a list of times, e.g. [0.1, 0.5, 2]")
+    floats = tuple(check_number("t_eval", time) for time in listed)
+    if not floats:
+        raise ValueError("t_eval: found no times; expected at least one; leave it out")
+    unsorted = next((pair for pair in pairwise(floats) if pair[0] >= pair[1]), None)
+    if unsorted is not None:
+        raise ValueError(f"t_eval: found {unsorted[1]:g} behind {unsorted[0]:g}; expected increasing times; sort them")
+    return floats
+
+
+def _check_sample_times(times: Sequence[float], transient: float, window: float) -> None:
+    end = transient + window
+    outside = next((time for time in times if not transient <= time <= end), None)
+    if outside is not None:
+        raise ValueError(
+            f"t_eval: found {outside:g}; expected times of the window, from {transient:g} to {end:g}; "
+            "change transient and window, or the times"
+        )
 
 
 def _section(model: Model, section_text: object) -> Section:
@@ -239,8 +272,10 @@ def _time_unit(model: Model, parameter_values: Mapping[str, float], unit_text: o
     return unit
 
 
-def _numerics(keywords: Mapping[str, object], records: Sequence[Record], window: float) -> dict[str, object]:
-    """Return the integrator, its tolerances and limits."""
+def _numerics(
+    keywords: Mapping[str, object], records: Sequence[Record], window: float, times: int
+) -> dict[str, object]:
+    """Return the integrator, its tolerances and limits; `times`: number of given sample times."""
     rtol = check_number("rtol", keywords["rtol"], *LIMITS["rtol"])
     atol = rtol / 10 if keywords["atol"] is None else check_number("atol", keywords["atol"], *LIMITS["atol"])
     integrator = check_choice("integrator", keywords["integrator"], ("auto", *integrators()))
@@ -250,11 +285,15 @@ def _numerics(keywords: Mapping[str, object], records: Sequence[Record], window:
         )
     max_steps = check_integer("max_steps", keywords["max_steps"], *LIMITS["max_steps"])
     trajectory = Record.TRAJECTORY in records
-    if keywords["samples"] is None:
+    if times:
+        if keywords["samples"] is not None:
+            raise ValueError("samples: found it beside t_eval; expected one of them; leave one out")
+        samples = times
+    elif keywords["samples"] is None:
         samples = round(min(max(SAMPLES[0], SAMPLES[1] * window + 1), SAMPLES[2])) if trajectory else 0
     else:
         samples = check_integer("samples", keywords["samples"], *LIMITS["samples"])
-    if trajectory and samples < 2:
+    if trajectory and samples < 2 and not times:
         raise ValueError(
             f"samples: found {samples} for the trajectory; expected at least 2, "
             "since both ends of the window are included; raise samples"

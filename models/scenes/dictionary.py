@@ -161,6 +161,8 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
     for name in ("observe", "sections", "stop", "draws"):
         if not written[name]:
             del written[name]
+    written["t_eval"] = list(values["t_eval"])
+    del written["samples" if values["t_eval"] else "t_eval"]
     written["sweep"] = {axis.name: list(axis.values) for axis in written.pop("axes")}
     return written
 

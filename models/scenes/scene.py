@@ -95,6 +95,9 @@ class Scene(HasDrawing, HasLatex):
     samples : int, optional
         Points of a trajectory, both ends of the window included; by default 100 a period or unit of time, between 401
         and 20 001.
+    t_eval : iterable of float, optional
+        Times of the points of a trajectory, in place of `samples`: increasing, from the end of the transient to the end
+        of the window, in units of `time_unit` from the start of the run.  They add "trajectory" to `record`.
     integrator : str
         The method; "auto" chooses one.
     rtol, atol : float
@@ -166,6 +169,7 @@ class Scene(HasDrawing, HasLatex):
     window: float
     time_unit: TimeUnit
     samples: int
+    t_eval: tuple[float, ...]
     integrator: str
     rtol: float
     atol: float
@@ -202,6 +206,7 @@ class Scene(HasDrawing, HasLatex):
         window: float = 100.0,
         time_unit: str | None = None,
         samples: int | None = None,
+        t_eval: Iterable[float] | None = None,
         integrator: str = "auto",
         rtol: float = 1e-8,
         atol: float | None = None,
@@ -369,6 +374,9 @@ class Scene(HasDrawing, HasLatex):
         keywords = {**self.given, "initial": start, **changes}
         if keywords["links"] is not None:  # layers of links replace the coupling and the graph of a single layer
             keywords |= {"coupling": None, "topology": None} | changes
+        for name, other in (("t_eval", "samples"), ("samples", "t_eval")):  # sample times of one kind replace the other
+            if changes.get(name) is not None:
+                keywords[other] = changes.get(other)
         if keywords["parameters"] is not None or single:
             table = {} if keywords["parameters"] is None else check_table("parameters", keywords["parameters"])
             keywords["parameters"] = {**without(self.model, table, single), **single}
@@ -476,6 +484,7 @@ _FOLLOWING = {
     "time_unit": None,
     "atol": None,
     "samples": None,
+    "t_eval": None,
 }
 """Keywords whose default depends on other keywords, with the value that stands for the default."""
 
@@ -486,6 +495,8 @@ def _frozen_keywords(keywords: Mapping[str, Any], values: Mapping[str, Any]) -> 
     for name, following in _FOLLOWING.items():
         if isinstance(keywords[name], str | None) and keywords[name] == following:
             frozen[name] = following
+    if values["t_eval"] and keywords["record"] is not None and Record.TRAJECTORY not in [*keywords["record"]]:
+        frozen["record"] = tuple(name for name in values["record"] if name != Record.TRAJECTORY)
     if GRAPH in values["draws"] and keywords["topology"] is not None:
         frozen["topology"] = as_topology(keywords["topology"])
     # A number or a range fits every number of nodes; a tuple has a number for each.

@@ -111,6 +111,7 @@ def _rows() -> dict[str, Table]:
             "additionalProperties": values,
         },
         "initial": {"type": "object", "additionalProperties": _either(numbers, _table(uniform, "low", "high"))},
+        "t_eval": numbers,
         "observe": {"type": "object", "additionalProperties": TEXT},
         "sections": {"type": "object", "additionalProperties": _table(section, "function")},
         "stop": TEXT,

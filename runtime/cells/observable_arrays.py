@@ -24,7 +24,13 @@ def watched(scene: Scene) -> Recording:
     The energy is replaced by sums over nodes and links.
     """
     sections = Sections(scene)
-    recording = Recording((), None, ObservableArrays(scene).values, sections.values, sections.stop)
+    recording = Recording(
+        records=(),
+        own_times=bool(scene.t_eval),
+        observed=ObservableArrays(scene).values,
+        sections=sections.values,
+        stop=sections.stop,
+    )
     if has_own_energy(scene.model) or not any(e.has(ENERGY) for e in (*recording.observed, *recording.events)):
         return recording
     value, sums = exact_energy(scene).rows()

@@ -31,7 +31,7 @@ class CellRows:
     # (cells, len(SpanColumn)): start and end of the window and period of the equations, in non-dimensional time;
     # synchronisation error below which a cell ends early (0: never); first step; longest step; number of steps before
     # the
-    # first pause (inf: never)
+    # first pause (inf: never); unit of the sample times
     spans: np.ndarray
 
     def __post_init__(self) -> None:
@@ -127,6 +127,7 @@ class Planner:
         spans[:, SpanColumn.PERIOD] = local_clock(self.equations, period)
         spans[:, SpanColumn.NEAR] = 0.0 if near is None else near
         spans[:, SpanColumn.FIRST_STEP], spans[:, SpanColumn.LOOK] = FIRST_STEP, math.inf
+        spans[:, SpanColumn.UNIT] = unit
         spans[:, SpanColumn.LONGEST] = longest_steps(self.equations, parameters, spans[:, SpanColumn.END])
         return spans
 

@@ -29,6 +29,7 @@ ONE_CELL: Mapping[str, Any] = {
     "zipped": False,
     "continuation": "none",
     "record": (),
+    "t_eval": None,
     "observe": None,
     "sections": None,
     "stop": None,

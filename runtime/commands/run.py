@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..console.arguments import add_workers, folder, part, settings, tolerance
+from ..console.arguments import add_workers, folder, part, settings, times, tolerance
 from ..console.outcome import FAILED, FINE, Failed, WrongUse, print_json, sentence, warn, wrong_use
 from ..console.scene_arguments import add_changed_scene, changed_scene
 from ..support.error_text import counted
@@ -46,15 +46,21 @@ PATIENCE = 10
 def configure(parser: ArgumentParser) -> None:
     """Add scene, folder and changes to the scene."""
     parser.usage = (
-        "synchain run SCENE --out DIR [--rtol X] [--workers N] [--set NAME=VALUE ...]\n"
-        "                    [--format FORMAT] [--resume | --overwrite] [--part K/N] [--dask ADDRESS]\n"
-        "                    [--certify] [--no-skip] [--json] [--explain]\n"
+        "synchain run SCENE --out DIR [--rtol X] [--t-eval TIMES] [--workers N]\n"
+        "                    [--set NAME=VALUE ...] [--format FORMAT] [--resume | --overwrite] [--part K/N]\n"
+        "                    [--dask ADDRESS] [--certify] [--no-skip] [--json] [--explain]\n"
         "       synchain run SCENE --explain [--rtol X] [--set NAME=VALUE ...] [--no-skip]"
     )
     add_changed_scene(parser, more="a,b,c or LO:HI:N sweeps a parameter or an initial state")
     parser.add_argument("--out", metavar="DIR", type=folder, help="folder for the files, made where it is missing")
     parser.add_argument(
         "--rtol", metavar="X", type=tolerance, help="relative tolerance of one step, above 0, at most 0.1"
+    )
+    parser.add_argument(
+        "--t-eval",
+        metavar="TIMES",
+        type=times,
+        help="times of a trajectory, in the unit of the scene: a,b,c or LO:HI:N",
     )
     parser.add_argument(
         "--format",
@@ -101,7 +107,8 @@ def execute(arguments: Namespace) -> int:
         if arguments.rtol is not None and "rtol" in settings(arguments):
             raise WrongUse("found --rtol beside --set rtol; expected one of them")
         scene = changed_scene(arguments)
-        scene = scene if arguments.rtol is None else scene.replace(rtol=arguments.rtol)
+        changes = {"rtol": arguments.rtol, "t_eval": arguments.t_eval}
+        scene = scene.replace(**{name: value for name, value in changes.items() if value is not None})
         skip = reduce_scene(scene, not arguments.no_skip)
         name = Path(arguments.scene).stem if arguments.scene.endswith(".toml") else arguments.scene
         if arguments.json and arguments.explain:

@@ -109,6 +109,11 @@ def spaced(text: str) -> tuple[float, ...]:
     return Axis.from_table("grid", span(text)).values
 
 
+def times(text: str) -> tuple[float, ...]:
+    """Read a,b,c or LO:HI:N as numbers."""
+    return spaced(text) if ":" in text else tuple(number(part) for part in text.split(","))
+
+
 def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, object]]:
     """Read name=value, name=a,b,c or name=LO:HI:N."""
     from synchain.models.inputs.checks import short_repr

@@ -33,12 +33,12 @@ def control_array(
 
 
 def control_of(planner: Planner, jumps: bool) -> np.ndarray:
-    """Return the control array of a scene's sweep: tolerances of the strictest cell, and a direction per section."""
+    """Return the control array of a scene's sweep: tolerances of the strictest cell, a direction per section, sample times."""
     scene = planner.scene
     rtol, atol = (float(column.min()) for column in tolerances(scene, scene.equations, planner.extremes().numbers))
     directions = [DIRECTIONS[section.direction] for section in scene.sections.values() or (scene.section,)]
     control = control_array(rtol, atol, math.inf, scene.max_steps, directions[0], jumps)
-    return np.concatenate([control, directions[1:]])
+    return np.concatenate([control, directions[1:], scene.t_eval])
 
 
 def first_step(growth: float) -> float:

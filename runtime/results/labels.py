@@ -186,10 +186,17 @@ def variables(
         yield "section", ("point", *STATE), states.table(points[:, :, PointColumn.STATE :])
     yield from Sections(scene).variables(buffers.points, most)
     if "trajectory" in scene.record:
-        fractions = np.linspace(0.0, 1.0, scene.samples) if scene.samples > 1 else np.zeros(1)
-        start, end = spans[:, SpanColumn.START, None], spans[:, SpanColumn.END, None]
-        yield "time", ("sample",), start + (end - start) * fractions
+        yield "time", ("sample",), sample_times(scene, spans)
         yield "trajectory", ("sample", *STATE), states.table(buffers.samples)
+
+
+def sample_times(scene: Scene, spans: np.ndarray) -> np.ndarray:
+    """Return the times (cells, samples) of the trajectory, from t = 0. Shapes: spans (cells, len(SpanColumn))."""
+    if scene.t_eval:
+        return np.asarray(spans[:, SpanColumn.UNIT, None] * np.array(scene.t_eval))
+    fractions = np.linspace(0.0, 1.0, scene.samples) if scene.samples > 1 else np.zeros(1)
+    start, end = spans[:, SpanColumn.START, None], spans[:, SpanColumn.END, None]
+    return np.asarray(start + (end - start) * fractions)
 
 
 def _masks(scene: Scene) -> np.ndarray:
@@ -230,6 +237,8 @@ def meaning(scene: Scene, name: str) -> str:
     if name == "status":
         codes = [status for status in Status if scene.stop is not None or status != Status.STOPPED]
         return f"{MEANINGS[name]}: {'; '.join(f'{code.value} {code.name.lower()}' for code in codes)}"
+    if name == "trajectory" and scene.t_eval:
+        return "states at the times t_eval"
     return Sections(scene).meanings().get(name) or MEANINGS[name]
 
 

@@ -21,7 +21,7 @@ planner
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 
 import numpy as np
@@ -48,6 +48,7 @@ def run(
     width: int | None = None,
     reduce: bool | ReducedScene = True,
     certified: bool = False,
+    t_eval: Iterable[float] | None = None,
     realisations: int | None = None,
     draws: Mapping[str, object] | None = None,
     rng: int | None = None,
@@ -81,6 +82,8 @@ def run(
     certified : bool
         Add the transversal exponent of every cell and a verdict on its synchronisation, and end
         cells early that are certain to stay synchronous (see `synchain.runtime.sweeps.certify`).
+    t_eval : iterable of float, optional
+        Times of a trajectory, as for `Scene`; they replace the sample times of the scene.
     realisations, draws, rng : optional
         As for `Scene`; they add a dimension to the sweep (docs/observing.md).
     workers : int, optional
@@ -131,7 +134,7 @@ def run(
     starts = None
     if start is not None and not several(start):
         scene, start_times = started(check_scene(scene), start)
-    scene = Given(run, parameters, axes).sweep(scene, realisations=realisations, draws=draws, rng=rng)
+    scene = Given(run, parameters, axes).sweep(scene, t_eval=t_eval, realisations=realisations, draws=draws, rng=rng)
     if start is not None and several(start):
         starts, start_times = starts_of_cells(scene, start)
         if check_flag("certified", certified):

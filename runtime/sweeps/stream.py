@@ -6,7 +6,7 @@ The stages are those of `run.py`. Before them, `claim` decides whether to begin 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -113,6 +113,7 @@ def stream(
     reduce: bool | ReducedScene = True,
     certified: bool = False,
     part: tuple[int, int] | None = None,
+    t_eval: Iterable[float] | None = None,
     realisations: int | None = None,
     draws: Mapping[str, object] | None = None,
     rng: int | None = None,
@@ -142,7 +143,7 @@ def stream(
         Run part k of N alone, (k, N) with k from 1 to N, into the file ".kofN.partial" beside `path`, as
         one job of a job array. `merge` makes the result of all parts. With `resume` a part that is not
         there is begun.
-    width, reduce, certified, realisations, draws, rng, parameters, **axes
+    width, reduce, certified, t_eval, realisations, draws, rng, parameters, **axes
         As for `run`.
     workers, executor, show_progress, progress
         As for `run`.
@@ -169,7 +170,7 @@ def stream(
     SweepFailed
         If the workers are lost or the disk is full.
     """
-    scene = Given(stream, parameters, axes).sweep(scene, realisations=realisations, draws=draws, rng=rng)
+    scene = Given(stream, parameters, axes).sweep(scene, t_eval=t_eval, realisations=realisations, draws=draws, rng=rng)
     reduction = as_reduction(scene, reduce)
     execution = Execution(workers, executor, show_progress, progress)
     reporter = execution.reporter(scene.cells)

@@ -394,6 +394,7 @@ def cells_of(scene: Scene, sigma: np.ndarray, criterion: AppliedCriterion) -> Sc
         axes={name: tuple(values) for name, values in axes.items()},
         zipped=True,
         record=("sync_error",),
+        t_eval=None,
         transient=criterion.transient,
         window=criterion.window,
         rtol=criterion.rtol,
