@@ -52,27 +52,34 @@ def check_masses(oscillator: Oscillator, values: Mapping[str, float]) -> None:
     """
     if isinstance(oscillator.model, FieldModel):
         return
-    names = {s.name for s in _masses(oscillator)[0].free_symbols}
-    _check_masses(oscillator, tuple((name, value) for name, value in values.items() if name in names))
-
-
-@lru_cache(maxsize=1024)
-def _check_masses(oscillator: Oscillator, values: tuple[tuple[str, float], ...]) -> None:
-    """Check the masses at given parameters, cached: nodes that differ only in other parameters share one check."""
-    masses, velocities = _masses(oscillator)
-    matrix = masses.subs({sp.Symbol(name, real=True): sp.Float(value) for name, value in values})
-    if matrix.free_symbols:
+    masses, names, velocities = _masses(oscillator)
+    if not {*names} <= values.keys():
         return
-    for k, velocity in enumerate(velocities):  # Sylvester's criterion: all leading minors are positive
-        if not matrix[: k + 1, : k + 1].det() > 0:
+    matrix = masses(*(values[name] for name in names))
+    diagonal = [row[k] for k, row in enumerate(matrix)]
+    for k, velocity in enumerate(velocities):  # the matrix is positive if all pivots of its elimination are
+        if not matrix[k][k] > 0.0:
             raise ValueError(
-                f"oscillator {oscillator.name!r}: the mass of the velocity {velocity} is {matrix[k, k]}, and its kinetic energy "
-                "not positive; expected T > 0 for every motion; correct T or the parameters"
+                f"oscillator {oscillator.name!r}: the mass of the velocity {velocity} is {diagonal[k]:g}, and its kinetic "
+                "energy not positive; expected T > 0 for every motion; correct T or the parameters"
             )
+        for row in matrix[k + 1 :]:
+            factor = row[k] / matrix[k][k]
+            row[:] = [a - factor * b for a, b in zip(row, matrix[k], strict=True)]
+
+
+def checked_parameters(oscillator: Oscillator, law: FrictionLaw | None) -> set[str]:
+    """Return the names of the parameters that `check_masses` and `check_power` read."""
+    names = set() if isinstance(oscillator.model, FieldModel) else {*_masses(oscillator)[1]}
+    return names if law is None else names | {*law.parameters}
 
 
 @lru_cache(maxsize=64)
-def _masses(oscillator: Oscillator) -> tuple[sp.Matrix, tuple[sp.Symbol, ...]]:
-    """Return the mass matrix as a function of the parameters, and the velocities that its rows belong to."""
+def _masses(
+    oscillator: Oscillator,
+) -> tuple[Callable[..., list[list[float]]], tuple[str, ...], tuple[sp.Symbol, ...]]:
+    """Return the mass matrix as a function of numbers, their names, and the velocities that its rows belong to."""
     system = nondimensional(oscillator)
-    return mass_matrix(system.kinetic, system.velocities), system.velocities
+    masses = mass_matrix(system.kinetic, system.velocities)
+    symbols = sorted(masses.free_symbols, key=str)
+    return sp.lambdify(symbols, masses.tolist(), "math"), tuple(s.name for s in symbols), system.velocities

@@ -112,8 +112,8 @@ def complete(keywords: Mapping[str, Any]) -> dict[str, Any]:
     # Checks of several keywords together.
     values["continuation"] = check_sweep(model, values)
     check_draws(model, values, drawn)
-    _check_friction(model, parameter_values, (*axes, *drawn), values["zipped"])
-    _check_physics(model, parameter_values, (*axes, *drawn))
+    check_friction(model, parameter_values, (*axes, *drawn), values["zipped"])
+    check_physics(model, parameter_values, (*axes, *drawn))
     return values
 
 
@@ -159,7 +159,7 @@ def _model(keywords: Mapping[str, Any], drawn: Mapping[str, Draws], rng: int) ->
     }
 
 
-def _check_physics(model: Model, parameter_values: Mapping[str, float], axes: Sequence[Axis]) -> None:
+def check_physics(model: Model, parameter_values: Mapping[str, float], axes: Sequence[Axis]) -> None:
     """Check friction and masses at the parameters of the scene and at the ends of its axes."""
     if all(isinstance(kind.oscillator.model, FieldModel) and kind.friction is None for kind in model.kinds):
         return
@@ -301,7 +301,7 @@ def _numerics(
     return {"integrator": integrator, "rtol": rtol, "atol": atol, "max_steps": max_steps, "samples": samples}
 
 
-def _check_friction(model: Model, parameter_values: Mapping[str, float], axes: Sequence[Axis], zipped: bool) -> None:
+def check_friction(model: Model, parameter_values: Mapping[str, float], axes: Sequence[Axis], zipped: bool) -> None:
     """Raise ValueError if static friction is below the friction of slow slip in a cell: no motion would be possible."""
     if model.contact != ContactModel.SET_VALUED:
         return
