@@ -10,6 +10,9 @@ from synchain.codegen.driver.columns import COUNTS, TOLERANCES, Count, PointColu
 
 from ..support.status import Status
 
+FINISHED = int(Status.FINISHED)
+"""`Status.FINISHED` as a number: NumPy compares with it three times as fast."""
+
 IN_MEMORY = 10**9
 """Size of the largest result in memory, in numbers (8 GB): a choice."""
 
@@ -82,7 +85,7 @@ class Buffers:
     @property
     def finished(self) -> np.ndarray:
         """True for each cell (cells,) that reached the end of its window."""
-        return np.asarray(self.status == Status.FINISHED)
+        return np.asarray(self.status == FINISHED)
 
     @property
     def ended(self) -> bool:

@@ -63,8 +63,7 @@ def by_place(equations: Equations, parameters: np.ndarray) -> dict[str, np.ndarr
     Places are the nodes and the links. The value is NaN for a parameter that a place does not have.
     Shapes: parameters (cells, parameters).
     """
-    drive = _drive(equations)
-    names = {name for expr in (*drive.paces, *drive.gaps, *drive.rises) for name in names_in(expr)}
+    names = drive_parameters(equations)
     columns = dict(zip(equations.parameters, parameters.T, strict=True))
     at_nodes = {name: [f"{name}_{i + 1}" for i in range(equations.n)] for name in equations.varied}
     at_links = {name: list(layer.names(name)) for name, layer in equations.numbered.items()}
@@ -75,6 +74,13 @@ def by_place(equations: Equations, parameters: np.ndarray) -> dict[str, np.ndarr
         padded = single + [""] * (places - len(single))
         values[name] = np.concatenate([columns.get(parameter, absent) for parameter in padded])
     return values
+
+
+def drive_parameters(equations: Equations) -> set[str]:
+    """Return the parameters, by their names in templates, on which the times of the drive depend."""
+    drive = _drive(equations)
+    frequency = () if drive.frequency is None else (drive.frequency,)
+    return {name for expr in (*frequency, *drive.paces, *drive.gaps, *drive.rises) for name in names_in(expr)}
 
 
 def _drive(equations: Equations) -> Drive:

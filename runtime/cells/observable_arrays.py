@@ -61,6 +61,15 @@ class ObservableArrays:
         equations = self.scene.equations
         return {value: equations.n if with_rows(equations, value) else 1 for value in self.values}
 
+    @cached_property
+    def _tallies_of(self) -> dict[sp.Expr, slice]:
+        """The tallies of each value."""
+        slices, first = {}, 0
+        for value, rows in self._rows.items():
+            slices[value] = slice(first, first + rows)
+            first += rows
+        return slices
+
     @property
     def numbers(self) -> int:
         """Number of values of all observables of a cell."""
@@ -87,13 +96,9 @@ class ObservableArrays:
         length = sums[:, len(SumColumn), None]
         length = np.where(length > 0.0, length, np.nan)
         tallies = sums[:, len(SumColumn) + 1 :].reshape(len(sums), -1, len(Tally))
-        rows_of, first = {}, 0
-        for value, rows in self._rows.items():
-            rows_of[value] = slice(first, first + rows)
-            first += rows
         parts = [sums[:, : len(SumColumn)]]
         for observable in self.scene.observe.values():
-            parts.append(_over_window(observable.window, tallies[:, rows_of[observable.value]], length))
+            parts.append(over_window(observable.window, tallies[:, self._tallies_of[observable.value]], length))
         return np.concatenate(parts, axis=1)
 
 
@@ -167,7 +172,7 @@ def _kept(section: Section) -> tuple[str, ...]:
     return section.keep or ()
 
 
-def _over_window(window: ObservedWindow, tallies: np.ndarray, length: np.ndarray) -> np.ndarray:
+def over_window(window: ObservedWindow, tallies: np.ndarray, length: np.ndarray) -> np.ndarray:
     """Return a reduction (cells, rows) over a window from tallies (cells, rows, len(Tally)).
 
     NaN for undefined values.

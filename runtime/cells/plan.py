@@ -93,11 +93,15 @@ class Planner:
         for name, values in columns.items():
             if name not in self.slots:
                 start[:, self.places[name]] = values
-        return CellRows(with_modes(self.equations, start, parameters), parameters, self._spans(parameters, near))
+        return self.started(start, parameters, self.spans_at(parameters, near))
+
+    def started(self, start: np.ndarray, parameters: np.ndarray, spans: np.ndarray) -> CellRows:
+        """Return the rows of these numbers, with the slip states that follow from them."""
+        return CellRows(with_modes(self.equations, start, parameters), parameters, spans)
 
     def spans(self, cells: np.ndarray) -> np.ndarray:
         """Return the spans (cells, len(SpanColumn)) of these cells, without their states."""
-        return self._spans(self._parameters(self.columns(cells), len(cells)), None)
+        return self.spans_at(self._parameters(self.columns(cells), len(cells)))
 
     def _parameters(self, columns: Mapping[str, np.ndarray], cells: int) -> np.ndarray:
         """Return the parameters (cells, parameters) of cells with these values of the axes."""
@@ -108,8 +112,8 @@ class Planner:
                 parameters[:, self.slots[name]] = values
         return parameters
 
-    def _spans(self, parameters: np.ndarray, near: np.ndarray | None) -> np.ndarray:
-        """Return the spans of cells with these parameters."""
+    def spans_at(self, parameters: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
+        """Return the spans of cells with these parameters (cells, parameters)."""
         scene, period = self.scene, periods(self.equations, parameters)
         unit = period if scene.time_unit == "period" else np.ones(len(period))
         if np.any(unit == 0.0):

@@ -101,6 +101,10 @@ class ReducedScene:
     skipped: tuple[str, ...]  # sentences about parts that are left out
     kept: tuple[str, ...]  # sentences about parts that remain, with the reason
     jumps: bool  # True if a cell with periodic motion skips whole cycles
+    observed: ObservableArrays = field(init=False, repr=False)  # the observables of the scene
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "observed", ObservableArrays(self.scene))
 
     @property
     def dimension(self) -> int:
@@ -111,11 +115,6 @@ class ReducedScene:
     def samples(self) -> int:
         """Points of a trajectory; 0 if none is recorded."""
         return self.scene.samples if "trajectory" in self.scene.record else 0
-
-    @property
-    def observed(self) -> ObservableArrays:
-        """The observables of the scene."""
-        return ObservableArrays(self.scene)
 
     @property
     def point_size(self) -> int:
@@ -144,6 +143,8 @@ class ReducedScene:
     def rows(self, rows: CellRows) -> CellRows:
         """Convert rows of the unreduced network to rows of the reduced network."""
         start, parameters = rows.start, rows.numbers
+        if not self.merge.merges and len(self.numbers) == parameters.shape[1]:
+            return rows
         if self.merge.merges:
             start = np.take(start, self.merge.states, axis=1)
         if len(self.numbers) < parameters.shape[1]:

@@ -88,7 +88,7 @@ class Ladder:
         series = (_taylor(self.scene, self.equations, is_large(self.equations)),) if _has_series(self.equations) else ()
         return (*series, integrator("dop853"), *((integrator(AUTO),) if self.solvable else ()))
 
-    @property
+    @cached_property
     def columns(self) -> np.ndarray:
         """The index among `method_names` of each method."""
         return np.array([method_names(self.scene).index(method.name) for method in self.methods])
@@ -138,11 +138,14 @@ class Ladder:
 
         `first`: index of the method.
         """
+        last = len(self.methods) - 1
+        if last == 0 and not self.methods[0].implicit:
+            return rows.spans
         spans = rows.spans.copy()
         implicit = np.flatnonzero(np.array([method.implicit for method in self.methods])[first])
         if len(implicit):
             spans[implicit, SpanColumn.FIRST_STEP] = first_steps(self.templates, rows.take(implicit))
-        spans[:, SpanColumn.LOOK] = np.where(first < len(self.methods) - 1, FIRST_LOOK, math.inf)
+        spans[:, SpanColumn.LOOK] = np.where(first < last, FIRST_LOOK, math.inf)
         return spans
 
     def further(self, rows: CellRows, buffers: Buffers, method: np.ndarray, lengths: np.ndarray) -> np.ndarray:
@@ -192,8 +195,8 @@ class Ladder:
         """
         rtol, atol = tolerances(self.scene, self.equations, rows.numbers)
         if self.scene.given["atol"] is None:
-            small = np.flatnonzero(np.abs(rows.start).max(axis=1) < 0.1)
-            if len(small):
+            small = np.abs(rows.start).max(axis=1) < 0.1
+            if small.any():
                 few = rows.take(small)
                 size = np.maximum(np.abs(few.start).max(axis=1), self.templates.reach(few.start, few.numbers))
                 atol[small] *= scale_of_atol(size)

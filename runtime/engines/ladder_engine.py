@@ -63,6 +63,8 @@ class LadderEngine:
         if room is None:
             room = first_room(reduction.scene, len(rows) * (reduction.point_size + 1))
         buffers = self._climb(rows, room)
+        if not (room or buffers.most_points):
+            return buffers
         short = np.flatnonzero(buffers.point_counts > room)
         if len(short):
             buffers.put(short, self._climb(rows.take(short), buffers.most_points))
@@ -73,27 +75,35 @@ class LadderEngine:
         """Integrate each row by its integrators, with buffers for `room` section points per row."""
         reduction, ladder = self.reduction, self.ladder
         buffers = reduction.empty(len(rows), room, reduction.observed.tallies)
-        buffers.tolerances[:] = np.stack(ladder.tolerances(rows), axis=1)
+        buffers.tolerances[:, 0], buffers.tolerances[:, 1] = ladder.tolerances(rows)
         method = ladder.first(rows)
-        rows = replace(rows, spans=ladder.steps(rows, method))
-        if len(ladder.methods) > 1:
-            buffers.lanes = np.zeros((len(rows), lane_size(reduction.equations)))
+        spans = ladder.steps(rows, method)
+        rows = rows if spans is rows.spans else replace(rows, spans=spans)
+        cells = np.arange(len(rows))
+        if len(ladder.methods) == 1:  # no cell changes its integrator
+            self._run_method(0, cells, rows, buffers)
+            buffers.counts[:, Count.BY_METHOD + ladder.columns[0]] = buffers.steps
+            buffers.sums = reduction.observed.summary(buffers.sums)
+            return buffers
+        buffers.lanes = np.zeros((len(rows), lane_size(reduction.equations)))
         # Steps, time and mean length of the steps at the last pause of each cell.
         paused_steps, paused_time, paused_length = np.zeros((3, len(rows)))
-        cells = np.arange(len(rows))
         while len(cells):
             # Run all cells that go on, those of one integrator together, and count their steps by integrator.
             earlier = buffers.steps[cells]
-            for k in np.unique(method[cells]):
-                self._run_method(int(k), cells[method[cells] == k], rows, buffers)
+            for k in range(len(ladder.methods)):
+                chosen = cells[method[cells] == k]
+                if len(chosen):
+                    self._run_method(k, chosen, rows, buffers)
             taken = buffers.steps[cells] - earlier
             buffers.counts[cells, Count.BY_METHOD + ladder.columns[method[cells]]] += taken
             # Cells that paused or got stuck may go on.
-            cells = cells[np.isin(buffers.status[cells], (Status.PAUSED, Status.STEP_UNDERFLOW))]
+            status = buffers.status[cells]
+            cells = cells[(status == Status.PAUSED) | (status == Status.STEP_UNDERFLOW)]
             if self.control[Control.CANCEL] != 0.0:
                 buffers.counts[cells, Count.STATUS] = Status.INTERRUPTED
                 break
-            if len(ladder.methods) == 1 or not len(cells):
+            if not len(cells):
                 break
             time, steps = buffers.sums[cells, SumColumn.STOPPED_AT], buffers.steps[cells]
             lengths = (time - paused_time[cells]) / np.maximum(steps - paused_steps[cells], 1.0)
@@ -117,15 +127,16 @@ class LadderEngine:
     def _run_method(self, method: int, cells: np.ndarray, rows: CellRows, buffers: Buffers) -> None:
         """Run some cells by one method, those of the same tolerances together."""
         kernel = self._kernel(self.ladder.methods[method])
-        pairs, pair_of = np.unique(buffers.tolerances[cells], axis=0, return_inverse=True)
-        for k, (rtol, atol) in enumerate(pairs):
-            group, control = cells[pair_of.reshape(-1) == k], self._control(float(rtol), float(atol))
-            if len(group) == len(rows):
-                run_rows(kernel, rows, control, buffers)
-            else:
-                part = buffers.take(group)
-                run_rows(kernel, rows.take(group), control, part)
-                buffers.put(group, part)
+        tolerances = buffers.tolerances[cells]
+        if len(cells) == len(rows) and (len(cells) == 1 or (tolerances == tolerances[0]).all()):
+            run_rows(kernel, rows, self._control(*tolerances[0].tolist()), buffers)
+            return
+        pairs, pair_of = np.unique(tolerances, axis=0, return_inverse=True)
+        for k, (rtol, atol) in enumerate(pairs.tolist()):
+            group, control = cells[pair_of.reshape(-1) == k], self._control(rtol, atol)
+            part = buffers.take(group)
+            run_rows(kernel, rows.take(group), control, part)
+            buffers.put(group, part)
 
     def _control(self, rtol: float, atol: float) -> np.ndarray:
         """Return the control array for these tolerances; `cancel` sets its flag."""

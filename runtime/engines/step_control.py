@@ -59,9 +59,12 @@ def tolerances(scene: Scene, equations: Equations, parameters: np.ndarray) -> tu
     kappa of the nodes.
     """
     rtol, atol = np.full(len(parameters), scene.rtol), np.full(len(parameters), scene.atol)
+    columns = [k for k, name in enumerate(equations.parameters) if name.startswith("kappa")]
+    if scene.contact != "atan" or not columns or not len(parameters):
+        return rtol, atol
     names = _names_of(scene, "kappa")
-    columns = [k for k, name in enumerate(equations.parameters) if name in names]
-    if scene.contact == "atan" and columns and len(parameters):
+    columns = [k for k in columns if equations.parameters[k] in names]
+    if columns:
         width = 1.0 / np.maximum(parameters[:, columns].max(axis=1), 1e-300)
         rtol, atol = np.minimum(rtol, np.maximum(width, 1e-13)), np.minimum(atol, np.maximum(0.1 * width, 1e-13))
     return rtol, atol
