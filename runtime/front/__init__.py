@@ -5,6 +5,7 @@
     graphs                                           a graph; `topology.spectrum` holds its exact eigenvalues
     Scene, load_scene, Axis, Section                 a network with its numbers, starts and records
     run, stream, merge, kernel                       trajectories and records of all cells of a scene
+    compile                                          a scene as a fast function of its parameters, with derivatives
     msf, plane, exponents, cluster_exponents,
     lyapunov_spectrum                                stability of synchronous, clustered and other motion
     thresholds, transition, universal_probe, basin   strengths and starts that synchronise
@@ -37,6 +38,7 @@ HOMES = {
     "Section": "models.scenes.section",
     "basin": "runtime.synchronisation.basin",
     "cluster_exponents": "runtime.stability.cluster_exponents",
+    "compile": "runtime.sweeps.compiled",
     "ends": "models.interactions.ends",
     "energy_terms": "models.scenes.energy",
     "energy_function": "runtime.results.energy_of_states",

@@ -35,6 +35,7 @@ from synchain.runtime.stability.exponents import exponents as exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum as lyapunov_spectrum
 from synchain.runtime.stability.msf import msf as msf
 from synchain.runtime.stability.msf import plane as plane
+from synchain.runtime.sweeps.compiled import compile as compile
 from synchain.runtime.sweeps.merge import merge as merge
 from synchain.runtime.sweeps.run import run as run
 from synchain.runtime.sweeps.stream import stream as stream

@@ -9,6 +9,8 @@ HOMES = {
     "Bifurcation": "runtime.bifurcation.results",
     "Branch": "runtime.bifurcation.results",
     "ClusterExponents": "runtime.stability.cluster_exponents",
+    "CompiledResult": "runtime.sweeps.compiled",
+    "CompiledRun": "runtime.sweeps.compiled",
     "Equilibrium": "runtime.bifurcation.equilibrium",
     "ExponentWindows": "runtime.synchronisation.exponent_windows",
     "Exponents": "runtime.stability.exponents",

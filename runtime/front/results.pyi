@@ -12,6 +12,8 @@ from synchain.runtime.stability.msf import MSF as MSF
 from synchain.runtime.stability.msf import Plane as Plane
 from synchain.runtime.support.progress import Progress as Progress
 from synchain.runtime.support.status import Status as Status
+from synchain.runtime.sweeps.compiled import CompiledResult as CompiledResult
+from synchain.runtime.sweeps.compiled import CompiledRun as CompiledRun
 from synchain.runtime.sweeps.errors import SweepFailed as SweepFailed
 from synchain.runtime.sweeps.errors import SweepInterrupted as SweepInterrupted
 from synchain.runtime.sweeps.stream import Streamed as Streamed

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import synchain as sc
-from synchain.models import Field, Scene
+from synchain import Field, Scene
 from synchain.runtime.cli import main
 
 OSCILLATOR = Field({"x": "v", "v": "-k*x - c*v"}, parameters={"k": 4.0, "c": 0.3})
@@ -109,7 +109,7 @@ def test_wrong_times_are_refused(change: dict[str, Any], message: str) -> None:
 
 
 def test_functions_with_windows_of_their_own_ignore_the_times() -> None:
-    pair = Scene("van_der_pol", "x->v", sc.chain(2), transient=0, window=30, t_eval=[1, 2])
+    pair = Scene("van_der_pol", "x->v", sc.graphs.chain(2), transient=0, window=30, t_eval=[1, 2])
     criterion = sc.Criterion(starts=1, transient=5, window=5)
     assert sc.basin(pair, samples=4, transient=20, window=5, sigma=0.5, show_progress=False).samples == 4
     swept = pair.replace(axes={"sigma": [0.1, 1.0]})
