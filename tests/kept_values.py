@@ -24,6 +24,7 @@ from synchain.runtime.stability.lyapunov import Lyapunov
 from synchain.runtime.stability.msf import MSF, Plane
 from synchain.runtime.synchronisation.basin import Basin
 from synchain.runtime.synchronisation.criterion import PAPER
+from synchain.runtime.synchronisation.critical import Critical
 from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
 from synchain.runtime.synchronisation.mismatch import Mismatch
 from synchain.runtime.synchronisation.probe import Probe
@@ -139,6 +140,19 @@ def every_kind() -> dict[str, Labelled]:
         ),
         thresholds(),
         Mismatch(PAIR, ("x", "v"), np.array([-2.0]), np.ones(1), np.ones((1, 2)), np.array([-0.1]), np.ones(1)),
+        Critical(
+            PAIR,
+            "sigma",
+            np.array([0.2, np.nan]),
+            np.array([0.01, np.nan]),
+            np.array([-1.0, np.nan]),
+            ("-2", ""),
+            ("periodic", ""),
+            ("", "no zero in the range"),
+            np.array([[1.1, 0.1, 0.1, 1e-3], [1.1, 0.3, -0.1, 1e-3]]),
+            "omega",
+            np.array([1.1, 1.2]),
+        ),
         transition(),
         TransitionCheck(transition(), np.array([[0.2, 0.4]]), np.array([[-0.1, np.nan]]), np.ones((1, 2)), ("w",)),
     )

@@ -8,7 +8,8 @@
     compile                                          a scene as a fast function of its parameters, with derivatives
     msf, plane, exponents, cluster_exponents,
     lyapunov_spectrum                                stability of synchronous, clustered and other motion
-    thresholds, transition, universal_probe, basin   strengths and starts that synchronise
+    thresholds, critical, transition,
+    universal_probe, basin                           strengths and starts that synchronise
     mismatch                                         errors of nearly equal nodes
     equilibrium, equilibria, periodic_orbit, follow,
     skeleton                                         states at rest, orbits, their branches and bifurcations
@@ -39,6 +40,7 @@ HOMES = {
     "basin": "runtime.synchronisation.basin",
     "cluster_exponents": "runtime.stability.cluster_exponents",
     "compile": "runtime.sweeps.compiled",
+    "critical": "runtime.synchronisation.critical",
     "ends": "models.interactions.ends",
     "energy_terms": "models.scenes.energy",
     "energy_function": "runtime.results.energy_of_states",

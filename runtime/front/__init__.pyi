@@ -41,6 +41,7 @@ from synchain.runtime.sweeps.run import run as run
 from synchain.runtime.sweeps.stream import stream as stream
 from synchain.runtime.synchronisation.basin import basin as basin
 from synchain.runtime.synchronisation.criterion import Criterion as Criterion
+from synchain.runtime.synchronisation.critical import critical as critical
 from synchain.runtime.synchronisation.mismatch import mismatch as mismatch
 from synchain.runtime.synchronisation.probe import universal_probe as universal_probe
 from synchain.runtime.synchronisation.threshold import thresholds as thresholds

@@ -11,6 +11,7 @@ HOMES = {
     "ClusterExponents": "runtime.stability.cluster_exponents",
     "CompiledResult": "runtime.sweeps.compiled",
     "CompiledRun": "runtime.sweeps.compiled",
+    "Critical": "runtime.synchronisation.critical",
     "Equilibrium": "runtime.bifurcation.equilibrium",
     "ExponentWindows": "runtime.synchronisation.exponent_windows",
     "Exponents": "runtime.stability.exponents",

@@ -18,6 +18,7 @@ from synchain.runtime.sweeps.errors import SweepFailed as SweepFailed
 from synchain.runtime.sweeps.errors import SweepInterrupted as SweepInterrupted
 from synchain.runtime.sweeps.stream import Streamed as Streamed
 from synchain.runtime.synchronisation.basin import Basin as Basin
+from synchain.runtime.synchronisation.critical import Critical as Critical
 from synchain.runtime.synchronisation.exponent_windows import ExponentWindows as ExponentWindows
 from synchain.runtime.synchronisation.mismatch import Mismatch as Mismatch
 from synchain.runtime.synchronisation.probe import Probe as Probe

@@ -27,6 +27,7 @@ from ..stability.msf import MSF, Plane
 from ..sweeps.run import run
 from ..sweeps.stream import Streamed
 from ..synchronisation.basin import Basin, Fate
+from ..synchronisation.critical import Critical
 from ..synchronisation.mismatch import Mismatch
 from ..synchronisation.probe import Probe
 from ..synchronisation.threshold import Thresholds
@@ -349,4 +350,21 @@ def _(value: Mismatch, axes: Axes, **style: Any) -> Axes:
         axes.plot(value.gamma, parts, **line_style(style, marker="o", linestyle="", label=symbol(name)))
     axes.set(xlabel=symbol("gamma"), ylabel="root mean square of deviations", yscale="log")
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4)
+    return axes
+
+
+@_draw.register
+def _(value: Critical, axes: Axes, **style: Any) -> Axes:
+    """Draw the values over the second parameter, else the exponents over the parameter; bars are two errors long."""
+    bars = {"marker": "o", "markersize": 3.0, "color": BLUE}
+    if value.along_values is not None:
+        axes.errorbar(value.along_values, value.value, 2 * value.error, **line_style(style, **bars))
+        axes.set(xlabel=symbol(value.along), ylabel=symbol(value.name))
+        return axes
+    tried = value.evaluations[np.argsort(value.evaluations[:, 1])]
+    axes.axhline(0.0, color=BLACK, linewidth=0.6)
+    axes.errorbar(tried[:, 1], finite(tried[:, 2]), 2 * tried[:, 3], **line_style(style, **bars))
+    bands(axes, [(float(value.value - value.error), float(value.value + value.error))])
+    axes.axvline(float(value.value), color=ORANGE, linewidth=0.9)
+    axes.set(xlabel=symbol(value.name), ylabel="largest exponent per unit of time")
     return axes

@@ -27,8 +27,6 @@ import numpy as np
 import xarray as xr
 
 from synchain.models.dynamics.synchrony import expect_vanishing
-from synchain.models.dynamics.variational import mode
-from synchain.models.inputs.checks import check_integer
 from synchain.models.inputs.display import HasPlot
 from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.names import expect_free
@@ -46,7 +44,8 @@ from ..support.error_text import range_text, with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .averages import Averaging, document_keywords
-from .exponents import RTOL, Exponents, along, coupled_cell, exponent_rows, orbits_of, transversal, with_partner
+from .exponents import RTOL, Exponents, coupled_cell, exponent_rows, transversal, with_partner
+from .largest_exponents import check_parameters, largest_exponents
 from .transversal_modes import SharedOrbit, shared_orbits, still_strengths, transversal_modes
 
 if TYPE_CHECKING:
@@ -699,16 +698,12 @@ def _over_parameters(
     at_first = {**fixed.values, **{name: values[0] for name, values in rows.items()}}
     cell = coupled_cell(replace(fixed, table=at_first), scene, chosen(scene, "rtol", rtol, RTOL))
     still = still_strengths(cell)
-    orbit_parameters = mode(cell.equations).orbit.parameters
-    for name, values in rows.items():
-        with_numbers(cell, {name: values[-1]})  # ValueError for a value out of range
+    for name in rows:
         if strengths and name in still and len(cell.strengths) == 1:
             raise ValueError(
                 f"plane: found the axes alpha and {name}; expected another parameter: alpha = -{name} gamma"
             )
-        if name not in still and name not in orbit_parameters:
-            names = ", ".join((*orbit_parameters, *sorted(still)))
-            raise ValueError(f"plane: no exponent depends on {name!r}; expected one of {names}")
+    check_parameters("plane", cell, {name: values[-1:] for name, values in rows.items()})
 
     # group the points of the grid by synchronous orbit
     (first, second), shape = axes, tuple(map(len, axes.values()))
@@ -721,25 +716,16 @@ def _over_parameters(
         place = np.arange(shape[0])[:, None]
         orbits = [SharedOrbit(points[:, k], {second: float(x)}, axes[first], place) for k, x in enumerate(axes[second])]
 
-    exponent, stderr, worst = np.empty(shape), np.empty(shape), np.empty(shape, dtype=int)
-    kinds, longest = np.empty((*shape, check_integer("starts", starts, 1)), dtype=object), 0.0
-    with averaging.reporter(len(orbits)) as reporter:
-        for done, orbit in enumerate(orbits, start=1):
-            at = np.unravel_index(orbit.cells, shape)
-            problem, states = orbits_of(with_numbers(cell, orbit.parameters), orbit.strengths, starts, averaging)
-            of_orbit = averaging.in_units(cell, problem.unit)
-            found = along(problem, states, orbit.strengths, of_orbit, reporter)
-            # keep the mode with the largest exponent at each point
-            table, points_of_orbit = found.exponent[orbit.place], np.arange(len(orbit.cells))
-            worst[at] = largest = table.argmax(axis=1)
-            exponent[at] = table[points_of_orbit, largest]
-            stderr[at] = found.stderr[orbit.place][points_of_orbit, largest]
-            kinds[at], longest = _kinds(found), max(longest, found.time)
-            reporter.advance(max(reporter.total * done / len(orbits) - reporter.done, 0.0))
+    found = largest_exponents(cell, orbits, starts, averaging)
+    exponent, stderr, index = (values.reshape(shape) for values in (found.exponent, found.stderr, found.mode))
     unmoved = still if modes else strengths
-    attractors = kinds[tuple(slice(1) if name in unmoved else slice(None) for name in axes)].astype(str)
-    (across, up), index = axes.values(), worst if modes else None
-    return Plane(shown, across, up, exponent, stderr, attractors, longest, (first, second), modes, index, strengths)
+    kinds = found.kinds.reshape(*shape, -1)
+    attractors = kinds[tuple(slice(1) if name in unmoved else slice(None) for name in axes)]
+    across, up = axes.values()
+    mode_index = index if modes else None
+    return Plane(
+        shown, across, up, exponent, stderr, attractors, found.time, (first, second), modes, mode_index, strengths
+    )
 
 
 def _coupling(scene: Scene) -> str:

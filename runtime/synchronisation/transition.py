@@ -442,8 +442,8 @@ def transition(
     [((1, 2),), ((0, 1, 2, 3),)]
     """
     given = Given(transition, parameters, more, ORBITS)
-    graph = check_scene(scene).topology
-    given.expect_one_cell(scene, unused_axes(scene))
+    given.expect_one_cell(check_scene(scene), unused_axes(scene))
+    graph = scene.topology
     if len(scene.model.linked) != 1:
         raise ValueError(f"transition: found {len(scene.model.linked)} layers of links; expected one")
     for eigenvalue in graph.spectrum:
