@@ -38,6 +38,9 @@ from .variational_integrator import GrowthWatch
 NO_SHIFT = np.array([1, 0, -1, 0])
 """Plan of blocks whose clock is not shifted."""
 
+ENDLESS = 1e9
+"""Length of a run for which the integrator is chosen; any that is long compared with the motion."""
+
 
 @dataclass(slots=True)
 class LiftedIntegrator:
@@ -70,6 +73,7 @@ class LiftedIntegrator:
         spans = np.zeros((count, len(SpanColumn)))
         spans[:, SpanColumn.FIRST_STEP], spans[:, SpanColumn.LOOK] = FIRST_STEP, math.inf
         spans[:, SpanColumn.PERIOD] = periods(lift.equations, values)
+        spans[:, SpanColumn.END] = ENDLESS  # the integrator is chosen for a long run
         spans[:, SpanColumn.LONGEST] = longest_steps(lift.equations, values, np.full(count, 1e3))
         row = CellRows(start[:1].copy(), values[:1].copy(), spans[:1].copy())
         method = chosen_for_rows(scene, lift.equations, row)

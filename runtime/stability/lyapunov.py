@@ -118,10 +118,11 @@ class Lyapunov(Labelled):
         dimension = f"{self.dimension:.4g}, from {low:.4g} to {high:.4g} within two errors"
         lost = int((~self.resolved).sum())
         fast = f"{lost} direction{'s' * (lost > 1)}, which decay too fast; their exponents sum to {self.rest:.8g}"
+        divergence = with_error(self.divergence, self.divergence_error)
         return (
             ("exponents", ", ".join([*shown, *(["…"] if len(self.exponent) > len(shown) else [])])),
             *((("not followed", fast),) if lost and len(self.exponent) == self.components else ()),
-            ("divergence", with_error(self.divergence, self.divergence_error)),
+            *((("divergence", divergence),) if not math.isnan(self.divergence) else ()),
             ("Kaplan-Yorke dimension", f"above {len(self.exponent)}" if math.isnan(self.dimension) else dimension),
             ("average", f"{self.time:.6g} units of time"),
             *((("unit", self.unit),) if self.unit else ()),

@@ -50,6 +50,8 @@ def test_the_largest_exponents_alone(ring: sc.results.Lyapunov) -> None:
     np.testing.assert_allclose(few.exponent, ring.exponent[:3], atol=1e-6)
     assert np.isnan(few.divergence)
     assert np.isnan(few.divergence_error)
+    assert "divergence" in dict(ring.summary)
+    assert "divergence" not in dict(few.summary)
 
 
 @pytest.mark.parametrize(
@@ -111,6 +113,19 @@ def test_two_kinds_of_oscillators_in_two_layers() -> None:
     )
     np.testing.assert_allclose(result.exponent, np.sort(np.linalg.eigvals(matrix).real)[::-1], atol=2e-3)
     assert result.exponent.sum() == pytest.approx(np.trace(matrix), abs=1e-6)
+
+
+@pytest.mark.long
+def test_nine_friction_oscillators_take_a_stiff_method() -> None:
+    """The start slips, so that only the layer of the smoothed jump is stiff; the kernel of modes takes the same method."""
+    scene = sc.Scene(topology=sc.graphs.chain(9), parameters={"omega": 1.15, "sigma": 0.1})
+    frame = TangentFrame.make(scene, 2, 0)
+    assert isinstance(frame.integrator, LiftedIntegrator)
+    assert frame.integrator.kernel.origin.method.implicit
+    _, least, lost = frame.advance(np.array([3]))
+    assert frame.integrator.steps < 10_000
+    assert least.min() > 0.1
+    assert not lost.any()
 
 
 def test_what_is_refused() -> None:
