@@ -65,6 +65,18 @@ def to_c(equations: Equations, values: Mapping[str, float] | None = None) -> str
 
     Networks of up to eight nodes are written out; larger networks become loops.  `values` (name -> number) become the
     defaults of PARAMETERS.  Raises ValueError for functions that C99 lacks and for unknown or missing values.
+
+    See Also
+    --------
+    synchain.export.to_python
+    synchain.export.to_numba
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> scene = sc.Scene("harmonic")
+    >>> "void rhs(" in sc.export.to_c(scene.equations, scene.parameters)
+    True
     """
     exported = Exported.of(equations, values, "c")
     model, numbers, small = exported.model, exported.numbers, is_unrolled(exported.model)

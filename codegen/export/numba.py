@@ -19,6 +19,18 @@ def to_numba(equations: Equations, values: Mapping[str, float] | None = None) ->
 
     Networks of up to eight nodes are written out; larger networks become loops.  `values` (name -> number) become the
     array PARAMETERS.  Raises ValueError for functions that Python's math lacks and for unknown or missing values.
+
+    See Also
+    --------
+    synchain.export.to_python
+    synchain.export.to_c
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> scene = sc.Scene("harmonic")
+    >>> "cfunc" in sc.export.to_numba(scene.equations, scene.parameters)
+    True
     """
     exported = Exported.of(equations, values, "numba")
     model = exported.model

@@ -40,6 +40,21 @@ def to_python(equations: Equations, values: Mapping[str, float] | None = None) -
     defaults.  Networks of up to eight nodes are written out, and jac returns a dense matrix.  Larger networks become
     array operations, and jac returns a sparse matrix.  Raises ValueError for functions that NumPy lacks and for unknown
     or missing values.
+
+    See Also
+    --------
+    synchain.export.to_c
+    synchain.export.to_numba
+    synchain.kernel
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> scene = sc.Scene("harmonic")
+    >>> module = {}
+    >>> exec(sc.export.to_python(scene.equations, scene.parameters), module)
+    >>> module["rhs"](0.0, [1.0, 0.0])
+    array([ 0., -1.])
     """
     exported = Exported.of(equations, values, "python")
     model, numbers, small = exported.model, exported.numbers, is_unrolled(exported.model)

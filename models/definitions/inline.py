@@ -114,6 +114,13 @@ def Lagrangian(
         For undeclared symbols, unused parameters, functions that generated code does not have, numbers that are not
         finite and real, unknown coordinates, a name with two meanings, and a velocity without kinetic energy.
 
+    See Also
+    --------
+    synchain.Field
+    synchain.Potential
+    synchain.friction
+    synchain.Parameter
+
     Examples
     --------
     >>> import sympy as sp
@@ -201,6 +208,12 @@ def Field(
     ValueError, TypeError
         As `Lagrangian` does.
 
+    See Also
+    --------
+    synchain.Lagrangian
+    synchain.Rates
+    synchain.Parameter
+
     Examples
     --------
     >>> import sympy as sp
@@ -271,6 +284,11 @@ def friction_law(
     ValueError, TypeError
         As `Lagrangian` does.
 
+    See Also
+    --------
+    synchain.friction
+    synchain.plugins.FrictionLaw
+
     Examples
     --------
     >>> from synchain import friction_law
@@ -338,6 +356,11 @@ def link_energy(
     ------
     ValueError, TypeError
         As `Lagrangian` does, and if no energy contains the weight of the link.
+
+    See Also
+    --------
+    synchain.Potential
+    synchain.Rates
 
     Examples
     --------

@@ -14,7 +14,20 @@ __all__ = ["load_friction_law", "load_oscillator", "read_coupling"]
 
 
 def load_oscillator(name: str) -> Oscillator:
-    """Return the oscillator of a plug-in."""
+    """Return the oscillator of a plug-in.
+
+    See Also
+    --------
+    synchain.Scene
+    synchain.Lagrangian
+    synchain.Field
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> sc.load_oscillator("rossler").states
+    ('x', 'y', 'z')
+    """
     oscillator: Oscillator = load(OSCILLATOR, name)
     return oscillator
 

@@ -175,6 +175,20 @@ def rate(state: object) -> sp.Expr:
 
     The derivative of the dense output is taken, which is one order less exact than the state.  The mean of a rate is
     the difference of the states at the ends of the window, divided by the length of the window.
+
+    See Also
+    --------
+    synchain.observe.mean
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> import synchain as sc
+    >>> x = sp.Symbol("x")
+    >>> node = sc.Field({"x": "v", "v": "-x"}, initial={"x": 1.0})
+    >>> scene = sc.Scene(node, transient=0, window=10, record=(), observe={"value": sc.observe.mean(sc.observe.rate(x)**2)})
+    >>> round(sc.run(scene, show_progress=False)["value"].item(), 6)
+    0.477176
     """
     e = real(state)
     if not e.is_Symbol:
@@ -242,6 +256,20 @@ class Observable:
     ------
     TypeError, ValueError
         If the value is no real expression.
+
+    See Also
+    --------
+    synchain.observe.mean
+    synchain.observe.maximum
+    synchain.observe.end
+    synchain.run
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> import synchain as sc
+    >>> sc.observe.mean(sp.Symbol("x") ** 2)
+    Observable(window='mean', value=x**2)
     """
 
     window: ObservedWindow
@@ -256,25 +284,104 @@ class Observable:
 
 
 def mean(value: object) -> Observable:
-    """Observe the mean of a value over the window; the integral is as exact as the dense output of the steps."""
+    """Observe the mean of a value over the window; the integral is as exact as the dense output of the steps.
+
+    See Also
+    --------
+    synchain.observe.variance
+    synchain.observe.maximum
+    synchain.observe.nodes
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> import synchain as sc
+    >>> x = sp.Symbol("x")
+    >>> node = sc.Field({"x": "v", "v": "-x"}, initial={"x": 1.0})
+    >>> scene = sc.Scene(node, transient=0, window=10, record=(), observe={"value": sc.observe.mean(x**2)})
+    >>> round(sc.run(scene, show_progress=False)["value"].item(), 6)
+    0.522824
+    """
     return Observable(ObservedWindow.MEAN, value)
 
 
 def maximum(value: object) -> Observable:
-    """Observe the largest value at the points of the quadrature; both ends of every step are among these points."""
+    """Observe the largest value at the points of the quadrature; both ends of every step are among these points.
+
+    See Also
+    --------
+    synchain.observe.minimum
+    synchain.observe.mean
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> import synchain as sc
+    >>> x = sp.Symbol("x")
+    >>> node = sc.Field({"x": "v", "v": "-x"}, initial={"x": 1.0})
+    >>> scene = sc.Scene(node, transient=0, window=10, record=(), observe={"value": sc.observe.maximum(x)})
+    >>> round(sc.run(scene, show_progress=False)["value"].item(), 6)
+    1.0
+    """
     return Observable(ObservedWindow.MAXIMUM, value)
 
 
 def minimum(value: object) -> Observable:
-    """Observe the smallest value at the points of the quadrature; both ends of every step are among these points."""
+    """Observe the smallest value at the points of the quadrature; both ends of every step are among these points.
+
+    See Also
+    --------
+    synchain.observe.maximum
+    synchain.observe.mean
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> import synchain as sc
+    >>> x = sp.Symbol("x")
+    >>> node = sc.Field({"x": "v", "v": "-x"}, initial={"x": 1.0})
+    >>> scene = sc.Scene(node, transient=0, window=10, record=(), observe={"value": sc.observe.minimum(x)})
+    >>> round(sc.run(scene, show_progress=False)["value"].item(), 6)
+    -1.0
+    """
     return Observable(ObservedWindow.MINIMUM, value)
 
 
 def end(value: object) -> Observable:
-    """Observe a value at the end of the window."""
+    """Observe a value at the end of the window.
+
+    See Also
+    --------
+    synchain.observe.mean
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> import synchain as sc
+    >>> x = sp.Symbol("x")
+    >>> node = sc.Field({"x": "v", "v": "-x"}, initial={"x": 1.0})
+    >>> scene = sc.Scene(node, transient=0, window=10, record=(), observe={"value": sc.observe.end(x)})
+    >>> round(sc.run(scene, show_progress=False)["value"].item(), 6)
+    -0.839072
+    """
     return Observable(ObservedWindow.END, value)
 
 
 def variance(value: object) -> Observable:
-    """Observe the variance of a value over the window: the mean square of its deviation from its mean."""
+    """Observe the variance of a value over the window: the mean square of its deviation from its mean.
+
+    See Also
+    --------
+    synchain.observe.mean
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> import synchain as sc
+    >>> x = sp.Symbol("x")
+    >>> node = sc.Field({"x": "v", "v": "-x"}, initial={"x": 1.0})
+    >>> scene = sc.Scene(node, transient=0, window=10, record=(), observe={"value": sc.observe.variance(x)})
+    >>> round(sc.run(scene, show_progress=False)["value"].item(), 6)
+    0.519864
+    """
     return Observable(ObservedWindow.VARIANCE, value)

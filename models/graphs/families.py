@@ -123,6 +123,11 @@ class Family:
     ValueError
         If the functions have different options, or an option has no default.
 
+    See Also
+    --------
+    synchain.graphs.topology
+    synchain.graphs.Topology
+
     Examples
     --------
     >>> from synchain.plugins import Family
@@ -314,6 +319,17 @@ def topology(name: str, n: int, **options: object) -> Topology:
         On an unknown name or option, on n below the family's minimum, and on more than LINK_LIMIT
         links.  Links are counted before any is built: in this call for a random graph, for other
         graphs on first use of their links.
+
+    See Also
+    --------
+    synchain.graphs.Topology
+    synchain.plugins.Family
+
+    Examples
+    --------
+    >>> from synchain.graphs import topology
+    >>> topology("circulant", 10, offsets=(1, 3))
+    Topology('circulant', n=10, offsets=(1, 3), 20 edges)
     """
     return family(name)(n, **options)
 

@@ -40,6 +40,17 @@ def cartesian(first: Topology, second: Topology) -> Topology:
     ------
     ValueError
         On more than LINK_LIMIT links.
+
+    See Also
+    --------
+    synchain.graphs.kronecker
+    synchain.graphs.union
+
+    Examples
+    --------
+    >>> from synchain.graphs import cartesian, chain, ring
+    >>> print(cartesian(ring(3), chain(2)).spectrum)
+    {0: 1, -2: 1, -3: 2, -5: 2}
     """
     return _of_two(Cartesian, first, second)
 
@@ -55,6 +66,16 @@ def kronecker(first: Topology, second: Topology) -> Topology:
     ------
     ValueError
         On more than LINK_LIMIT links.
+
+    See Also
+    --------
+    synchain.graphs.cartesian
+
+    Examples
+    --------
+    >>> from synchain.graphs import complete, kronecker
+    >>> kronecker(complete(3), complete(2)).n
+    6
     """
     return _of_two(Kronecker, first, second)
 
@@ -66,6 +87,17 @@ def union(first: Topology, second: Topology) -> Topology:
     ------
     ValueError
         On more than LINK_LIMIT links.
+
+    See Also
+    --------
+    synchain.graphs.cartesian
+    synchain.graphs.complement
+
+    Examples
+    --------
+    >>> from synchain.graphs import chain, ring, union
+    >>> print(union(ring(3), chain(2)).spectrum)
+    {0: 2, -2: 1, -3: 2}
     """
     return _of_two(Union, first, second)
 
@@ -79,6 +111,16 @@ def complement(graph: Topology) -> Topology:
     ------
     ValueError
         If a link is one-way or has a weight other than 1, or on more than LINK_LIMIT links.
+
+    See Also
+    --------
+    synchain.graphs.union
+
+    Examples
+    --------
+    >>> from synchain.graphs import complement, ring
+    >>> print(complement(ring(5)).spectrum)
+    {0: 1, -5/2 + sqrt(5)/2: 2, -5/2 - sqrt(5)/2: 2}
     """
     graph = as_topology("complement", graph)
     rule = Complement((graph,))
@@ -98,6 +140,16 @@ def weighted(graph: Topology, factor: object) -> Topology:
     ------
     ValueError
         If the factor is 0.
+
+    See Also
+    --------
+    synchain.graphs.from_edges
+
+    Examples
+    --------
+    >>> from synchain.graphs import chain, weighted
+    >>> print(weighted(chain(3), "1/3").spectrum)
+    {0: 1, -1/3: 1, -1: 1}
     """
     graph = as_topology("weighted", graph)
     exact = rational(factor, "factor")

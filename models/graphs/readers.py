@@ -59,6 +59,21 @@ def from_edges(
         On a loop, a repeated edge, a weight that is 0 or not rational, and on a node outside 0 … n - 1.
     TypeError
         On nodes that cannot be hashed.
+
+    See Also
+    --------
+    synchain.graphs.from_matrix
+    synchain.graphs.from_graph
+    synchain.graphs.read_edges
+
+    Examples
+    --------
+    >>> from synchain.graphs import from_edges
+    >>> graph = from_edges([(0, 1), (1, 2, "1/2"), (2, 0)])
+    >>> graph.n
+    3
+    >>> print(graph.spectrum)
+    {0: 1, -2: 1, -3: 1}
     """
     nodes = None if n is None else range(check_integer(f"{name}: n", n, 1))
     return edge_graph(edges, nodes, directed, name)
@@ -115,6 +130,18 @@ def from_graph(graph: Any, weight: str | None = "weight", name: str = "graph") -
     ValueError
         On loops, on weights that are not rational, and if no edge has the attribute `weight` (the default is
         allowed to be missing).
+
+    See Also
+    --------
+    synchain.graphs.from_edges
+    synchain.graphs.read_graphml
+
+    Examples
+    --------
+    >>> import networkx as nx
+    >>> from synchain.graphs import from_graph
+    >>> print(from_graph(nx.petersen_graph()).spectrum)
+    {0: 1, -2: 5, -5: 4}
     """
     if not is_graph(graph):
         raise TypeError(f"{name} is a {type(graph).__name__}; expected a networkx graph (nodes, edges, is_directed)")
@@ -155,6 +182,19 @@ def from_sparse(matrix: object, adjacency: bool = False, name: str = "matrix") -
     ValueError
         If the matrix is not square, if a row sum of G exceeds 1e-12 of the row's entries, or if an adjacency
         matrix has a non-zero diagonal.
+
+    See Also
+    --------
+    synchain.graphs.from_matrix
+    synchain.graphs.from_edges
+
+    Examples
+    --------
+    >>> from scipy.sparse import coo_array
+    >>> from synchain.graphs import from_sparse
+    >>> adjacency = coo_array(([1.0, 1.0], ([0, 1], [1, 0])), shape=(2, 2))
+    >>> print(from_sparse(adjacency, adjacency=True).spectrum)
+    {0: 1, -2: 1}
     """
     if not hasattr(matrix, "tocoo"):
         raise TypeError(f"{name} is a {type(matrix).__name__}; expected a SciPy sparse matrix (one that has tocoo)")
@@ -196,6 +236,22 @@ def read_edges(path: str | Path, directed: bool = False) -> Topology:
         If there is no such file.
     ValueError
         As `from_edges` raises.
+
+    See Also
+    --------
+    synchain.graphs.from_edges
+    synchain.graphs.read_matrix
+    synchain.graphs.read_graphml
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> from synchain.graphs import read_edges
+    >>> file = Path(mkdtemp()) / "triangle.txt"
+    >>> _ = file.write_text("0 1\\n1 2\\n2 0\\n")
+    >>> print(read_edges(file).spectrum)
+    {0: 1, -3: 2}
     """
     text, name = file_text(path, "edge file")
     one, most = Fraction(1), LINK_LIMIT if directed else LINK_LIMIT // 2
@@ -236,9 +292,25 @@ def read_graphml(path: str | Path, weight: str = "weight") -> Topology:
     ValueError
         On a document type, nested graphs, hyperedges or unknown nodes, and as `from_edges` raises.
 
+    See Also
+    --------
+    synchain.graphs.from_graph
+    synchain.graphs.read_edges
+
     References
     ----------
     U. Brandes et al., Graph Drawing 2001, LNCS 2265, 501.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> import networkx as nx
+    >>> from synchain.graphs import read_graphml
+    >>> file = Path(mkdtemp()) / "path.graphml"
+    >>> nx.write_graphml(nx.path_graph(3), file)
+    >>> print(read_graphml(file).spectrum)
+    {0: 1, -1: 1, -3: 1}
     """
     text, name = file_text(path, "GraphML file")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:  # even inside a comment, whose limits are unsure

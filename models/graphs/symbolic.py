@@ -87,6 +87,11 @@ def from_symbols(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "
 
     Every row must sum to zero.  Raises ValueError on another shape, a row sum that is not 0, more than LARGEST nodes and
     an entry that is no rational function.
+
+    See Also
+    --------
+    synchain.graphs.from_matrix
+    synchain.graphs.joint_spectrum
     """
     table = square(rows, name)
     n = len(table)

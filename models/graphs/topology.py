@@ -78,6 +78,21 @@ class Topology(Exact, HasDrawing):
     ValueError, TypeError
         If there are not n distinct labels, or if a link refers to an unknown node, joins a node to itself, is repeated,
         out of order or without weight.
+
+    See Also
+    --------
+    synchain.graphs.from_edges
+    synchain.graphs.topology
+    synchain.graphs.Spectrum
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> graph = sc.graphs.chain(4)
+    >>> graph
+    Topology('chain', n=4, 3 edges)
+    >>> print(graph.spectrum)
+    {0: 1, -2 + sqrt(2): 1, -2: 1, -2 - sqrt(2): 1}
     """
 
     name: str
@@ -335,6 +350,18 @@ def from_matrix(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "m
         On a wrong shape, a wrong number or a row sum other than zero.
     TypeError
         On an entry that is no number.
+
+    See Also
+    --------
+    synchain.graphs.from_edges
+    synchain.graphs.from_sparse
+    synchain.graphs.read_matrix
+
+    Examples
+    --------
+    >>> from synchain.graphs import from_matrix
+    >>> print(from_matrix([[-1, 1, 0], [1, -2, 1], [0, 1, -1]]).spectrum)
+    {0: 1, -1: 1, -3: 1}
     """
     table = [list(row) for row in rational_rows(rows, name)]
     entries = rows.tolist() if hasattr(rows, "tolist") else rows
@@ -371,6 +398,21 @@ def read_matrix(path: str | Path) -> Topology:
         If there is no such file.
     ValueError
         On a folder, on more than FILE_LIMIT bytes or on text that is no number, and as `from_matrix` raises.
+
+    See Also
+    --------
+    synchain.graphs.from_matrix
+    synchain.graphs.read_edges
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> from synchain.graphs import read_matrix
+    >>> file = Path(mkdtemp()) / "pair.csv"
+    >>> _ = file.write_text("-1,1\\n1,-1\\n")
+    >>> print(read_matrix(file).spectrum)
+    {0: 1, -2: 1}
     """
     text, name = file_text(path, "matrix file", "a text file of rows")
     return from_matrix(parse_rows(text, name), name)

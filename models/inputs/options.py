@@ -47,6 +47,17 @@ def integer_option(what: str, value: object, low: int, high: int | None = None) 
         If the value is no whole number.
     ValueError
         If the number is out of range.
+
+    See Also
+    --------
+    synchain.plugins.Family
+    synchain.plugins.integers_option
+
+    Examples
+    --------
+    >>> from synchain.plugins import integer_option
+    >>> integer_option("step", "2", 1)
+    2
     """
     if isinstance(value, str) and _INTEGER.fullmatch(value.strip()):
         value = int(value)
@@ -76,6 +87,11 @@ def integers_option(what: str, value: object, low: int) -> tuple[int, ...]:
         If the value is no list, or an entry no whole number.
     ValueError
         If the list is empty, or a number is below `low`.
+
+    See Also
+    --------
+    synchain.plugins.Family
+    synchain.plugins.integer_option
     """
     if isinstance(value, str):
         entries: Iterable[object] = re.split("[,x]", value) if _LIST.fullmatch(value) else [value]
@@ -112,6 +128,16 @@ def probability_option(what: str, value: object) -> str:
         If the value is no number.
     ValueError
         If the number is not rational, or not from 0 to 1.
+
+    See Also
+    --------
+    synchain.plugins.Family
+
+    Examples
+    --------
+    >>> from synchain.plugins import probability_option
+    >>> probability_option("p", "1/2")
+    '1/2'
     """
     chance = rational(value, what)
     if not 0 <= chance <= 1:

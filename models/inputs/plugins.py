@@ -105,6 +105,11 @@ def allow_code(*paths: str | Path) -> None:
     ------
     ValueError
         If a path is not a file that ends in .py.
+
+    See Also
+    --------
+    synchain.load_scene
+    synchain.load_oscillator
     """
     for path in paths:
         file = check_path("plug-in", path)

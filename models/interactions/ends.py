@@ -60,6 +60,11 @@ def ends(node: Oscillator, source: Oscillator | None = None) -> tuple[End, End, 
     TypeError
         If a node is no Oscillator.
 
+    See Also
+    --------
+    synchain.Rates
+    synchain.Potential
+
     Examples
     --------
     >>> from synchain import ends

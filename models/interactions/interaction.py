@@ -55,6 +55,12 @@ class Rates:
         For a key that is no state of the target, a symbol that is not declared, a parameter or weight that no term
         contains, and a value that is no expression.
 
+    See Also
+    --------
+    synchain.Potential
+    synchain.ends
+    synchain.link_energy
+
     Examples
     --------
     >>> import sympy as sp
@@ -149,6 +155,22 @@ class Potential:
     ValueError, TypeError
         For a symbol that is not declared, a parameter or weight that the energy does not contain, an energy of only one
         end, and a value that is no expression.
+
+    See Also
+    --------
+    synchain.Rates
+    synchain.ends
+    synchain.link_energy
+    synchain.Lagrangian
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> i, j, W = sc.ends(sc.load_oscillator("harmonic"))
+    >>> spring = sc.Potential(W * (j.x - i.x) ** 2 / 2)
+    >>> print(sc.export.text(sc.Scene("harmonic", spring, sc.graphs.chain(2)).equations))
+    x_1'' = -x_1 + x_2 - x_1
+    x_2'' = -x_2 + x_1 - x_2
     """
 
     energy: sp.Expr

@@ -68,6 +68,11 @@ class FrictionLaw:
     ------
     ValueError
         If the force jumps at w = 0 by more than its signs do.
+
+    See Also
+    --------
+    synchain.friction_law
+    synchain.friction
     """
 
     name: str

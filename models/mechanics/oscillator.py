@@ -29,6 +29,11 @@ def friction(velocity: sp.Expr) -> sp.Expr:
     Expr
         An undefined function of the velocity; the friction law of the node replaces this function.
 
+    See Also
+    --------
+    synchain.friction_law
+    synchain.Lagrangian
+
     Examples
     --------
     >>> import sympy as sp
@@ -119,6 +124,18 @@ class Oscillator:
     ----------
     states : tuple of str
         Names of the states.  The symbol of each state is an attribute: ``node.x``.
+
+    See Also
+    --------
+    synchain.Lagrangian
+    synchain.Field
+    synchain.load_oscillator
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> sc.load_oscillator("rossler").states
+    ('x', 'y', 'z')
     """
 
     name: str

@@ -35,6 +35,17 @@ class Parameter:
     ------
     ValueError
         If the default is not finite or outside the range, and if the unit cannot be read.
+
+    See Also
+    --------
+    synchain.Lagrangian
+    synchain.Field
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> sc.Parameter(0.5, "N*s/m")
+    Parameter(default=0.5, unit='N*s/m', meaning='', minimum=None, maximum=None, positive=False, scale='1')
     """
 
     default: float

@@ -37,6 +37,18 @@ def latex(equations: Equations) -> str:
     -------
     str
         An align* environment; more than LARGEST nodes give one equation for node i.
+
+    See Also
+    --------
+    synchain.export.text
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> print(sc.export.latex(sc.Scene("harmonic").equations))
+    \\begin{align*}
+      & x'' = -x
+    \\end{align*}
     """
     checked = check_instance("latex", equations, Equations, EXPECTED)
     body = " \\\\\n".join(f"  & {line}" for line in lines(checked, Latex()))
@@ -55,6 +67,16 @@ def text(equations: Equations) -> str:
     -------
     str
         One equation a line; more than LARGEST nodes give one for node i.
+
+    See Also
+    --------
+    synchain.export.latex
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> print(sc.export.text(sc.Scene("harmonic").equations))
+    x'' = -x
     """
     return "\n".join(lines(check_instance("text", equations, Equations, EXPECTED), Text()))
 

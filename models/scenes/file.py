@@ -30,7 +30,18 @@ _TOKEN = re.compile(rf"(?P<word>{'|'.join(_STRINGS)}|[\w+-]+|[ \t]+)|(?P<dot>\.)
 
 
 def scene_names() -> tuple[str, ...]:
-    """Return the names of the scenes that are shipped with the package."""
+    """Return the names of the scenes that are shipped with the package.
+
+    See Also
+    --------
+    synchain.load_scene
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> "figure_4a" in sc.scene_names()
+    True
+    """
     folder = resources.files(f"{__package__}.library")
     return tuple(sorted(item.name[:-5] for item in folder.iterdir() if item.name.endswith(".toml")))
 
@@ -40,6 +51,11 @@ def load_scene(name_or_path: str | os.PathLike[str]) -> Scene:
 
     Raises ValueError or TypeError for a missing or unreadable file, and for values that `Scene` refuses; the message
     begins with the name of the file.  No code in the file is executed.
+
+    See Also
+    --------
+    synchain.scene_names
+    synchain.Scene
 
     Examples
     --------

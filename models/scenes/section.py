@@ -38,6 +38,17 @@ class Section:
     ------
     ValueError, TypeError
         For an unknown direction, a level that is no finite number, or an expression that cannot be read.
+
+    See Also
+    --------
+    synchain.Scene
+    synchain.run
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> sc.Section("x_1", direction="rising", level=0.5)
+    Section(variable='x_1', direction='rising', level=0.5, keep=None)
     """
 
     variable: str

@@ -114,6 +114,11 @@ def joint_spectrum(graphs: Sequence[Matrix]) -> tuple[JointEigenvalue, ...]:
     ProofError
         If an eigenvalue of A + t B is no sum a + t b, a mistake of the program.
 
+    See Also
+    --------
+    synchain.graphs.Spectrum
+    synchain.graphs.Topology
+
     Examples
     --------
     >>> from synchain.graphs import complete, joint_spectrum, ring

@@ -34,6 +34,20 @@ class Spectrum(HasLatex, HasPlot):
     error_probability : float, optional
         If the two polynomials were compared modulo large primes: the approximate probability that
         the comparison missed a difference.
+
+    See Also
+    --------
+    synchain.graphs.Topology
+    synchain.graphs.joint_spectrum
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> spectrum = sc.graphs.star(6).spectrum
+    >>> print(spectrum)
+    {0: 1, -1: 4, -6: 1}
+    >>> [(str(e.exact), e.multiplicity) for e in spectrum]
+    [('0', 1), ('-1', 4), ('-6', 1)]
     """
 
     eigenvalues: Sequence[Eigenvalue]

@@ -21,6 +21,11 @@ class Axis:
     Raises TypeError or ValueError for an empty axis, for more than LIMIT values, and for values that are no finite
     numbers.
 
+    See Also
+    --------
+    synchain.Scene
+    synchain.run
+
     Examples
     --------
     >>> from synchain import Axis

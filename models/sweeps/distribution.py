@@ -68,17 +68,46 @@ class Draw:
 
 
 def normal(mean: float, deviation: float) -> Draw:
-    """Return the normal distribution of a mean and a standard deviation."""
+    """Return the normal distribution of a mean and a standard deviation.
+
+    See Also
+    --------
+    synchain.draw.uniform
+    synchain.draw.lorentzian
+    synchain.run
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> scene = sc.Scene("van_der_pol", "x->x", sc.graphs.ring(5), record=())
+    >>> result = sc.run(scene, realisations=3, draws={"x": sc.draw.normal(0, 0.1)}, rng=1)
+    >>> result.data.sizes["realisation"]
+    3
+    """
     return Draw(Distribution.NORMAL, mean, deviation)
 
 
 def uniform(low: float, high: float) -> Draw:
-    """Return the uniform distribution between two numbers."""
+    """Return the uniform distribution between two numbers.
+
+    See Also
+    --------
+    synchain.draw.normal
+    synchain.draw.lorentzian
+    synchain.run
+    """
     return Draw(Distribution.UNIFORM, low, high)
 
 
 def lorentzian(centre: float, half_width: float) -> Draw:
-    """Return the Lorentz (Cauchy) distribution of a centre and a half width at half maximum."""
+    """Return the Lorentz (Cauchy) distribution of a centre and a half width at half maximum.
+
+    See Also
+    --------
+    synchain.draw.normal
+    synchain.draw.uniform
+    synchain.run
+    """
     return Draw(Distribution.LORENTZIAN, centre, half_width)
 
 

@@ -68,6 +68,19 @@ class Clusters:
         For each layer the graph whose nodes are the clusters.
     blocks : tuple of Block
         The differences within clusters, in the finest blocks.
+
+    See Also
+    --------
+    synchain.graphs.clusters
+    synchain.graphs.orbital_partitions
+    synchain.cluster_exponents
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> found = sc.graphs.clusters(sc.graphs.star(4), [0, 1, 1, 1])
+    >>> found.classes
+    (0, 1, 1, 1)
     """
 
     classes: tuple[int, ...]
@@ -112,6 +125,11 @@ def orbital_partitions(
     ------
     ValueError
         On more than NODE_LIMIT nodes, `limit` automorphisms or `partition_limit` partitions.
+
+    See Also
+    --------
+    synchain.graphs.clusters
+    synchain.cluster_exponents
 
     Examples
     --------
@@ -161,6 +179,13 @@ def clusters(graph: Graphs, classes: Sequence[int]) -> Clusters:
         If the partition is not balanced in every layer, or does not give one cluster for each node.
     TypeError
         If `classes` is no sequence.
+
+    See Also
+    --------
+    synchain.graphs.orbital_partitions
+    synchain.graphs.Clusters
+    synchain.cluster_exponents
+    synchain.transition
 
     Examples
     --------

@@ -122,6 +122,10 @@ class Equilibrium(Labelled):
         Largest rate but for the speeds.
     steps : int
         Steps of Newton's method.
+
+    See Also
+    --------
+    synchain.equilibrium
     """
 
     scene: Scene = field(repr=False)

@@ -99,6 +99,10 @@ class PeriodicOrbit(Labelled):
     extent : ndarray, shape (components,)
         Extent of each component, the unit of distances between states. For a component at rest, the unit follows from
         the distance that Newton's method went from its start.
+
+    See Also
+    --------
+    synchain.periodic_orbit
     """
 
     scene: Scene = field(repr=False)

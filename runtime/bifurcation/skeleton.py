@@ -75,6 +75,10 @@ class Skeleton(Labelled):
         Each rises in the parameter; sorted by the number of periods and the first value.
     searched : mapping of str to (float, float)
         Range of initial values of each component in the search.
+
+    See Also
+    --------
+    synchain.skeleton
     """
 
     branches: tuple[Branch, ...]

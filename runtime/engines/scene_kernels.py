@@ -34,6 +34,17 @@ def kernel(scene: Scene, width: int | None = None, reduce: bool | ReducedScene =
     ------
     ValueError
         If the width is none of these, or if the reduction is that of another scene.
+
+    See Also
+    --------
+    synchain.run
+    synchain.export.to_python
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> "def kernel" in sc.kernel(sc.Scene("harmonic")).source
+    True
     """
     return load(kernel_source(scene, width, reduce))
 

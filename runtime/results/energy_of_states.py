@@ -92,6 +92,18 @@ class EnergyFunction:
 def energy_function(scene: Scene) -> EnergyFunction:
     """Return the compiled energy of a scene's network; raise ValueError as
     `synchain.models.scenes.energy.energy` does.
+
+    See Also
+    --------
+    synchain.energy_terms
+    synchain.run
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> energy = sc.energy_function(sc.Scene("harmonic"))
+    >>> float(energy([[1.0, 0.0]])[0])
+    0.5
     """
     exact = energy_terms(check_scene(scene))
     equations, places = exact.equations, exact.equations.places  # places[i]: indices of the states of node i

@@ -74,6 +74,10 @@ class ClusterExponents(Labelled):
         those of a coarser state.
     unit : str
         Unit in which transient and average are counted.
+
+    See Also
+    --------
+    synchain.cluster_exponents
     """
 
     state: Clusters
@@ -223,6 +227,12 @@ def cluster_exponents(
     RuntimeWarning
         If clusters approach each other. The first half of the transient is dropped; then the largest distance in the
         second half of the motion is at most half of that in the first half.
+
+    See Also
+    --------
+    synchain.graphs.clusters
+    synchain.exponents
+    synchain.transition
     """
     execution = Execution(1, None, show_progress, progress)
     averaging = Averaging.for_scene(scene, precision, periods, transient, seed, execution)

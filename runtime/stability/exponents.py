@@ -81,6 +81,10 @@ class Exponents(Labelled):
         Unit of time in which transients and averages are counted.
     precision : float
         Requested standard error.
+
+    See Also
+    --------
+    synchain.exponents
     """
 
     alpha: np.ndarray
@@ -352,6 +356,12 @@ def exponents(
         If a start reaches another attractor than the scene's own start; the exponents are those of the scene's own
         start.
 
+    See Also
+    --------
+    synchain.msf
+    synchain.plane
+    synchain.lyapunov_spectrum
+
     Notes
     -----
     The scene provides the model, the parameters, the first initial state, `contact`, `integrator`, `atol` and
@@ -366,6 +376,13 @@ def exponents(
         strength of links that vanish between equal states does not change the orbit.
     FloatingPointError
         If an integration fails.
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> scene = sc.Scene("rossler", "x->x", sc.graphs.ring(6))
+    >>> sc.exponents(scene, [0.0, 1.0], periods=200).exponent.shape
+    (2,)
     """
     given = Given(exponents, parameters, more, ORBITS)
     execution = Execution(workers, None, show_progress, progress)

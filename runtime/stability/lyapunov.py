@@ -82,6 +82,10 @@ class Lyapunov(Labelled):
         Number of exponents of the network.
     unit : str
         Unit in which transient and average are counted.
+
+    See Also
+    --------
+    synchain.lyapunov_spectrum
     """
 
     exponent: np.ndarray

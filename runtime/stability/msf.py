@@ -107,6 +107,10 @@ class MSF(Labelled):
         Requested strengths.
     fine : Exponents
         The exponents at 1001 strengths or more, among them `alpha`.
+
+    See Also
+    --------
+    synchain.msf
     """
 
     scene: Scene
@@ -346,6 +350,10 @@ class Plane(Labelled):
         Index in `modes` of the mode with the largest exponent.
     strengths : tuple of str
         Names of the axes that are strengths of a mode; all other axes are parameters.
+
+    See Also
+    --------
+    synchain.plane
     """
 
     scene: Scene
@@ -628,6 +636,11 @@ def plane(
         layers do not commute, and as in `exponents`.
     FloatingPointError
         If an integration fails.
+
+    See Also
+    --------
+    synchain.msf
+    synchain.exponents
 
     References
     ----------

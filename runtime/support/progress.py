@@ -45,6 +45,10 @@ class Progress:
         unless counted in `compiling`.
     unit : str
         The unit: "cell", "period" or "value".
+
+    See Also
+    --------
+    synchain.run
     """
 
     total: float

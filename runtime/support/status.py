@@ -11,7 +11,12 @@ CODES = 16
 
 
 class Status(IntEnum):
-    """Status of one cell; only `FINISHED` is success.  Generated kernels use the same numbers."""
+    """Status of one cell; only `FINISHED` is success.  Generated kernels use the same numbers.
+
+    See Also
+    --------
+    synchain.run
+    """
 
     NOT_RUN = 0
     FINISHED = 1

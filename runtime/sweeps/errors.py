@@ -16,6 +16,10 @@ class SweepInterrupted(KeyboardInterrupt):
     """Ctrl-C during a sweep.
 
     `finished` of `cells` cells had finished, and are in `result` unless a file stores them.
+
+    See Also
+    --------
+    synchain.stream
     """
 
     def __init__(self, finished: int, cells: int, result: Result | None = None) -> None:
@@ -31,7 +35,12 @@ class SweepInterrupted(KeyboardInterrupt):
 
 
 class SweepFailed(RuntimeError):
-    """A worker or the disk has failed; `finished` of `cells` cells had finished, and are in `result` or in a file."""
+    """A worker or the disk has failed; `finished` of `cells` cells had finished, and are in `result` or in a file.
+
+    See Also
+    --------
+    synchain.run
+    """
 
     def __init__(self, reason: str, finished: int, cells: int, result: Result | None = None) -> None:
         super().__init__(f"{reason}; {finished} of {cells} cells had finished")

@@ -55,7 +55,12 @@ JOB_THREADS = 8
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Streamed(Labelled):
-    """A finished run: file, number of cells with each status and, for certified runs, with each verdict."""
+    """A finished run: file, number of cells with each status and, for certified runs, with each verdict.
+
+    See Also
+    --------
+    synchain.stream
+    """
 
     path: Path
     scene: Scene
@@ -169,6 +174,24 @@ def stream(
         On Ctrl-C.
     SweepFailed
         If the workers are lost or the disk is full.
+
+    See Also
+    --------
+    synchain.run
+    synchain.merge
+    synchain.open_result
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> import sympy as sp
+    >>> import synchain as sc
+    >>> x = sp.Symbol("x")
+    >>> scene = sc.Scene("duffing", record=(), observe={"far": sc.observe.maximum(x)})
+    >>> streamed = sc.stream(scene, Path(mkdtemp()) / "far.nc", omega=[1.0, 2.0], show_progress=False)
+    >>> sc.open_result(streamed.path)["far"].sizes["omega"]
+    2
     """
     scene = Given(stream, parameters, axes).sweep(scene, t_eval=t_eval, realisations=realisations, draws=draws, rng=rng)
     reduction = as_reduction(scene, reduce)

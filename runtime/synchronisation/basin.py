@@ -68,6 +68,10 @@ class Basin(Labelled):
 
     A start that is not synchronous counts as still approaching if its error falls, or if the time is too short for any
     error to fall below the tolerance.
+
+    See Also
+    --------
+    synchain.basin
     """
 
     scene: Scene
@@ -238,6 +242,11 @@ def basin(
         axes or draws.
     TypeError
         If the number of samples is not whole.
+
+    See Also
+    --------
+    synchain.run
+    synchain.thresholds
     """
     _check(scene, samples, tolerance, confidence)
     execution = Execution(workers, executor, show_progress, progress)

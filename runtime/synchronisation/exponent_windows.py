@@ -34,6 +34,10 @@ class ExponentWindows:
         Strengths alpha, and the exponents at these strengths.
     beyond : tuple of float
         Ends of windows that are ends of the grid; the windows may extend beyond.
+
+    See Also
+    --------
+    synchain.thresholds
     """
 
     intervals: tuple[Interval, ...] = ()

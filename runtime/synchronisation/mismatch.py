@@ -62,6 +62,10 @@ class Mismatch(Labelled):
         Largest transversal exponent of the mode.
     stderr : ndarray, shape (modes,)
         Standard errors of `exponent`.
+
+    See Also
+    --------
+    synchain.run
     """
 
     scene: Scene

@@ -48,7 +48,12 @@ MODE_BETA = sp.Symbol("mode_beta", real=True)
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Probe(Labelled):
-    """Verdicts of the probe over complex strengths alpha + i beta; alpha, beta, error and share have one shape."""
+    """Verdicts of the probe over complex strengths alpha + i beta; alpha, beta, error and share have one shape.
+
+    See Also
+    --------
+    synchain.universal_probe
+    """
 
     scene: Scene
     criterion: AppliedCriterion
@@ -130,6 +135,11 @@ def universal_probe(
     ValueError
         If strengths are missing or not finite, if the scene has no coupling, if it has a stop, draws, or
         axes other than sigma, or if its coupling is not proportional to sigma and to the weight of a link.
+
+    See Also
+    --------
+    synchain.thresholds
+    synchain.msf
     """
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     real, imaginary = _broadcast(alpha, beta)

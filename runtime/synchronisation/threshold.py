@@ -77,6 +77,10 @@ class Thresholds(Labelled):
     The exponents are the most reliable. Simulation and probe depend on the transient: near an end of a range, errors
     fall too slowly for any transient. `warnings` names such ends. `criterion` stores the numbers that were used.
     `direct`, `predicted` and `exponents` are ranges of sigma, `probe` contains ranges of alpha = sigma abs(gamma).
+
+    See Also
+    --------
+    synchain.thresholds
     """
 
     scene: Scene
@@ -218,6 +222,12 @@ def thresholds(
         For a network without links, for one-way links whose eigenvalues are complex, for unequal
         nodes, for links with inertia, and for a scene with a stop, draws or axes, but for one of sigma,
         which is not used; if a step of the grid is above 1e9 times the resolution.
+
+    See Also
+    --------
+    synchain.msf
+    synchain.universal_probe
+    synchain.transition
     """
     check_scene(scene).equations.expect_alike("thresholds")
     expect_vanishing("thresholds", scene.equations)

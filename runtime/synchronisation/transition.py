@@ -97,6 +97,10 @@ class Transition(Labelled):
     ----------
     function : MSF
         Master stability function of the scene, whose stable ranges determine the strengths.
+
+    See Also
+    --------
+    synchain.transition
     """
 
     function: MSF
@@ -292,6 +296,10 @@ class TransitionCheck(Labelled):
         Standard errors of `exponent`.
     remarks : tuple of str
         Why exponents of a step are not computed, or are those of another state; else empty.
+
+    See Also
+    --------
+    synchain.transition
     """
 
     transition: Transition
