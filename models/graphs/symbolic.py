@@ -92,6 +92,13 @@ def from_symbols(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "
     --------
     synchain.graphs.from_matrix
     synchain.graphs.joint_spectrum
+
+    Examples
+    --------
+    >>> from synchain.graphs import from_symbols
+    >>> graph = from_symbols([["-a", "a"], ["b", "-b"]])
+    >>> [str(factor.as_expr()) for factor, _ in graph.spectrum.factors]
+    ['a + b + z', 'z']
     """
     table = square(rows, name)
     n = len(table)

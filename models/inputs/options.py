@@ -92,6 +92,12 @@ def integers_option(what: str, value: object, low: int) -> tuple[int, ...]:
     --------
     synchain.plugins.Family
     synchain.plugins.integer_option
+
+    Examples
+    --------
+    >>> from synchain.plugins import integers_option
+    >>> integers_option("shape", "3x4", 1)
+    (3, 4)
     """
     if isinstance(value, str):
         entries: Iterable[object] = re.split("[,x]", value) if _LIST.fullmatch(value) else [value]

@@ -110,6 +110,18 @@ def allow_code(*paths: str | Path) -> None:
     --------
     synchain.load_scene
     synchain.load_oscillator
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> import synchain as sc
+    >>> file = Path(mkdtemp()) / "decay.py"
+    >>> text = "from synchain import Field\\nOSCILLATOR = Field({'x': '-x'}, initial={'x': 1.0})\\n"
+    >>> _ = file.write_text(text)
+    >>> sc.plugins.allow_code(file)
+    >>> sc.Scene(str(file)).n
+    1
     """
     for path in paths:
         file = check_path("plug-in", path)

@@ -73,6 +73,13 @@ class FrictionLaw:
     --------
     synchain.friction_law
     synchain.friction
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> law = sc.friction_law("mu*sign(w)", {"mu": 0.3})
+    >>> isinstance(law, sc.plugins.FrictionLaw), law.force
+    (True, mu*sign(w))
     """
 
     name: str

@@ -95,6 +95,14 @@ def uniform(low: float, high: float) -> Draw:
     synchain.draw.normal
     synchain.draw.lorentzian
     synchain.run
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> scene = sc.Scene("van_der_pol", "x->x", sc.graphs.ring(5), record=())
+    >>> draws = {"x": sc.draw.uniform(-2, 2)}
+    >>> sc.run(scene, realisations=3, draws=draws, rng=1, show_progress=False).data.sizes["realisation"]
+    3
     """
     return Draw(Distribution.UNIFORM, low, high)
 
@@ -107,6 +115,13 @@ def lorentzian(centre: float, half_width: float) -> Draw:
     synchain.draw.normal
     synchain.draw.uniform
     synchain.run
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> frequencies = sc.draw.lorentzian(0, 0.5)
+    >>> frequencies
+    Draw(distribution='lorentzian', first=0.0, second=0.5)
     """
     return Draw(Distribution.LORENTZIAN, centre, half_width)
 

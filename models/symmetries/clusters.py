@@ -193,7 +193,7 @@ def clusters(graph: Graphs, classes: Sequence[int]) -> Clusters:
 
     >>> from synchain.graphs import clusters, ring, star
     >>> [(len(block.cluster_of), block.multiplicity) for block in clusters([ring(4), star(4)], [0] * 4).blocks]
-    [(2, 1), (1, 1)]
+    [(1, 1), (2, 1)]
     """
     graphs = _layers("clusters", graph)
     n = graphs[0].n

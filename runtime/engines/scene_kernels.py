@@ -43,7 +43,7 @@ def kernel(scene: Scene, width: int | None = None, reduce: bool | ReducedScene =
     Examples
     --------
     >>> import synchain as sc
-    >>> "def kernel" in sc.kernel(sc.Scene("harmonic")).source
+    >>> "Generated kernel: 1 oscillator" in sc.kernel(sc.Scene("harmonic")).source
     True
     """
     return load(kernel_source(scene, width, reduce))

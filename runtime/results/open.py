@@ -54,6 +54,16 @@ def open_result(path: str | os.PathLike[str]) -> Labelled:
     --------
     synchain.run : Computes a `Result`.
     synchain.stream : Writes a `Result` to a file while it is computed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> import synchain as sc
+    >>> file = Path(mkdtemp()) / "result.nc"
+    >>> sc.run(sc.Scene("duffing", record=()), show_progress=False).save(file)
+    >>> sc.open_result(file).success
+    True
     """
     path = check_path("result", path)
     if is_block_log(path):

@@ -233,6 +233,14 @@ def cluster_exponents(
     synchain.graphs.clusters
     synchain.exponents
     synchain.transition
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> scene = sc.Scene("rossler", "x->x", sc.graphs.star(4), parameters={"sigma": 0.5})
+    >>> found = sc.cluster_exponents(scene, [0, 1, 1, 1], periods=300, show_progress=False)
+    >>> found.exponent.shape
+    (1,)
     """
     execution = Execution(1, None, show_progress, progress)
     averaging = Averaging.for_scene(scene, precision, periods, transient, seed, execution)

@@ -646,6 +646,15 @@ def plane(
     ----------
     Several layers: Sorrentino, New J. Phys. 14, 033035 (2012); links that act between equal states: Belykh, de Lange &
     Hasler, Phys. Rev. Lett. 94, 188101 (2005).
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> node = sc.Field({"x": "v", "v": "x - x**3 - 0.25*v + 0.4*cos(t)"}, initial={"x": 0.5})
+    >>> scene = sc.Scene(node, "v->v", sc.graphs.ring(4), time_unit="time")
+    >>> found = sc.plane(scene, [0.0, 0.5, 1.0], [0.0, 1.0], starts=1, periods=200, show_progress=False)
+    >>> found.exponent.shape
+    (3, 2)
     """
     execution = Execution(workers, None, show_progress, progress)
     averaging = Averaging.for_scene(scene, precision, periods, transient, seed, execution)

@@ -140,6 +140,15 @@ def universal_probe(
     --------
     synchain.thresholds
     synchain.msf
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> node = sc.Field({"x": "v", "v": "x - x**3 - 0.25*v + 0.4*cos(t)"}, initial={"x": 0.5})
+    >>> scene = sc.Scene(node, "v->v", sc.graphs.ring(4), time_unit="time")
+    >>> found = sc.universal_probe(scene, [0.1, 1.0], 0, show_progress=False)
+    >>> found.data.sizes["start"]
+    8
     """
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     real, imaginary = _broadcast(alpha, beta)

@@ -228,6 +228,15 @@ def thresholds(
     synchain.msf
     synchain.universal_probe
     synchain.transition
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> node = sc.Field({"x": "v", "v": "x - x**3 - 0.25*v + 0.4*cos(t)"}, initial={"x": 0.5})
+    >>> scene = sc.Scene(node, "v->v", sc.graphs.ring(4), time_unit="time")
+    >>> found = sc.thresholds(scene, sigma=[0.0, 0.2, 0.4, 0.6], precision=0.01, show_progress=False)
+    >>> len(found.direct.intervals)
+    1
     """
     check_scene(scene).equations.expect_alike("thresholds")
     expect_vanishing("thresholds", scene.equations)
