@@ -415,8 +415,10 @@ class Search:
             matrix = sparse.block_array([[matrix, -border], [pins, None]], format="csc")
         change = _solve_linear(matrix, np.append(-gap, np.zeros(count)))
         step, speeds = change[: len(gap)], change[len(gap) :]
-        # Of all steps that differ by shifts, take the one normal to them; their vectors have no states in common.
-        return step - self.shifts @ (self.shifts.T @ step / self.shifts.sum(axis=0)), speeds
+        # Of all steps that differ by shifts, take the one normal to them; their vectors have no states in common. J is
+        # zero along a shift, but the implicit Euler step has -rate there, which the speeds take over.
+        means = self.shifts.T @ step / self.shifts.sum(axis=0)
+        return step - self.shifts @ means, speeds + rate * means
 
     def newton(self) -> bool:
         """Advance by Newton's method, and return whether it reached an equilibrium."""
