@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields, replace
+from functools import lru_cache
 from typing import Any
 
 import sympy as sp
@@ -238,12 +239,18 @@ class _Texts:
             self.names |= {name: sp.Symbol(name, positive=True) for name in scaling.units}
 
     def write(self, e: sp.Expr) -> str:
-        text = written(e)
-        if read(self.what, text, self.names) != e:
-            raise ValueError(
-                f"{self.what}: found {short_repr(e)}, which no text makes; make it with Lagrangian, Field or link_energy"
-            )
-        return text
+        return _text_of(self.what, e, tuple(self.names.items()))
+
+
+@lru_cache(maxsize=1024)  # each result stores its scene
+def _text_of(what: str, e: sp.Expr, names: tuple[tuple[str, sp.Symbol], ...]) -> str:
+    """Return an expression as text; raise ValueError if reading the text gives another expression."""
+    text = written(e)
+    if read(what, text, dict(names)) != e:
+        raise ValueError(
+            f"{what}: found {short_repr(e)}, which no text makes; make it with Lagrangian, Field or link_energy"
+        )
+    return text
 
 
 def _parameter_tables(parameters: Mapping[str, Parameter]) -> dict[str, Any]:

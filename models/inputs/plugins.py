@@ -18,7 +18,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -208,6 +208,7 @@ def located(error: Exception, function: Callable[..., object]) -> ValueError:
     return _located(error, inspect.getsourcefile(function) or function.__module__)
 
 
+@cache  # the package does not change while it runs; each name of a scene is looked up here
 def _shipped(kind: PluginKind) -> tuple[str, ...]:
     package = import_module(f"{PACKAGE}.{kind.folder}")
     return tuple(m.name for m in pkgutil.iter_modules(package.__path__) if not m.name.startswith("_"))
