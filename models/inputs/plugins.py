@@ -13,12 +13,13 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import os
 import pkgutil
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cache, lru_cache
+from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -208,10 +209,15 @@ def located(error: Exception, function: Callable[..., object]) -> ValueError:
     return _located(error, inspect.getsourcefile(function) or function.__module__)
 
 
-@cache  # the package does not change while it runs; each name of a scene is looked up here
 def _shipped(kind: PluginKind) -> tuple[str, ...]:
-    package = import_module(f"{PACKAGE}.{kind.folder}")
-    return tuple(m.name for m in pkgutil.iter_modules(package.__path__) if not m.name.startswith("_"))
+    folders = tuple(import_module(f"{PACKAGE}.{kind.folder}").__path__)
+    return _listed(folders, tuple(os.stat(path).st_mtime_ns if os.path.isdir(path) else 0 for path in folders))
+
+
+@lru_cache(maxsize=64)
+def _listed(folders: tuple[str, ...], times: tuple[int, ...]) -> tuple[str, ...]:
+    """Return the modules of folders; `times` of their last change keep the list up to date when a file is added."""
+    return tuple(m.name for m in pkgutil.iter_modules(folders) if not m.name.startswith("_"))
 
 
 def _group(kind: PluginKind) -> str:
