@@ -274,7 +274,7 @@ def outcome(lane, clock, y, control, dims):
     if pauses(lane, clock):
         return PAUSED
     if CONTACTS and clock[RUSH * WIDTH + lane] >= LONGEST_RUSH:
-        return CHATTERING
+        return AMBIGUOUS if clock[RUSH * WIDTH + lane] == math.inf else CHATTERING
     if clock[STEP * WIDTH + lane] <= 4e-16 * max(min(1.0, clock[UNTIL * WIDTH + lane]), t):
         return DIVERGED if largest > 1e8 else UNDERFLOW  # a blow-up in finite time stops the steps first
     return 0

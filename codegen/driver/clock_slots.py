@@ -31,14 +31,14 @@ HALTED, MARK, MARKED_AT, LAPSE, HIGH, RECORD, ORIGIN = 25, 26, 27, 28, 29, 30, 3
 FROM, UNTIL, DUE, BOUND, LOOKED_AT = 32, 33, 34, 35, 36
 CLOCK = 37
 # How a cell left its lane; a cell that pauses comes back, with this integrator or another one.
-FINISHED, BUDGET, UNDERFLOW, DIVERGED, INTERRUPTED, CHATTERING, STOPPED, PAUSED = 1, 2, 3, 4, 5, 6, 7, 8
+FINISHED, BUDGET, UNDERFLOW, DIVERGED, INTERRUPTED, CHATTERING, STOPPED, PAUSED, AMBIGUOUS = 1, 2, 3, 4, 5, 6, 7, 8, 9
 # Columns of `spans`: of a sweep, behind start, end, period and the error of synchronous cells.
 FIRST_OF_CELL, LONGEST_OF_CELL, FIRST_LOOK, UNIT_OF_CELL = 4, 5, 6, 7
 # Columns of `control`, of `sums`, behind which stand the values that were observed for some time, and of `counts`.
 RTOL, ATOL, FIRST_STEP, MAX_STEP, MAX_STEPS, DIRECTION, CANCEL, NO_JUMPS, FURTHER = 0, 1, 2, 3, 4, 5, 6, 7, 8
 MEAN, PEAK, LAST, STOPPED_AT, OBSERVED = 0, 1, 2, 3, 4
 STATUS, N_ACCEPTED, N_REJECTED, N_POINTS, N_SKIPPED = 0, 1, 2, 3, 4
-# So many events in a row without time passing are chattering.
+# So many events in a row without time passing are chattering; an infinite number stands for an ambiguous event.
 LONGEST_RUSH = 200.0
 # A state of this size, 2^53, has diverged: its neighbours are further apart than anything that happens at size one.
 FAR = 9007199254740992.0

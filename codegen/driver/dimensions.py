@@ -35,6 +35,12 @@ class Dimensions(NamedTuple):
     """0 if no trajectory is recorded, 1 for equally spaced samples, 2 for samples at the times in `control`."""
     stops: int
     """1 if a function of the state ends a cell, else 0."""
+    rows: int
+    """Contacts, or rows of all nodes."""
+    felt: int
+    """The largest number of rows of a node."""
+    contacts: int
+    """Groups of memory for the output of `pushes`, and for what the driver stores behind it."""
 
 
 class ModeDimensions(NamedTuple):
@@ -53,3 +59,5 @@ class ModeDimensions(NamedTuple):
     """Length of the array in which a step of the orbit leaves what the modes need."""
     jumps: int
     """1 if slip begins with a jump of acceleration, else 0."""
+    rows: int
+    """Contacts of all nodes."""

@@ -16,11 +16,12 @@ from ..simd.addresses import address
 from ..simd.lanes import any_lane, broadcast, lane_bits, load, maximum, minimum, select, store
 from .cells import REPEATING, aligned, begin, fill, outcome, put, restart, turn_over, watch
 from .clock_slots import *
-from .contacts import change_modes, note_rush, take_back
+from .contacts import change_modes
 from .control import accept_series, advance, aim, arrive, judge, pause, wrap
 from .dense import inside
 from .frames import GONE, LENGTHS, NEXT, PARTS, PRODUCTS, SHIFT, VOLUMES, close_block, drain, orthogonalise
 from .landings import begin_leg, begin_products, bring, close_batch, hand_over, land, lay_out
+from .passages import note_rush, take_back
 from .propagators import TILE, TO, apply, larger, scale, settle, tabulate
 from .records import *
 
@@ -309,7 +310,7 @@ def march(functions, dims, owners, first, last, inputs, deviations, outputs, pro
     out = address(dense, dense_size)
     shared = address(out, contact_size)
     slips = address(shared, dims.shared)
-    friction = Friction(middle, out, (), dims, functions.pushes)
+    friction = Friction(middle, out, clock, address(control, 0), (), dims, functions)
     orbit = Orbit(clock, y, y_new, dense, shared, slips, address(control, 0), friction)
 
     # 2. Workspace of the deviations, in registers.

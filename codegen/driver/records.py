@@ -40,13 +40,15 @@ class Results(NamedTuple):
 
 
 class Friction(NamedTuple):
-    """Contacts of set-valued friction: their function, its arguments and its output."""
+    """Contacts or rows: the functions of the scene that decide on them, their arguments and their output."""
 
     middle: Any  # address of a state inside a step
     out: Any  # address of the output of `pushes`
+    clock: Any
+    control: Any  # address
     network: Any  # arrays of links and their weights; () if the step is written out
     dims: Any
-    pushes: Any
+    functions: Any  # `pushes`; of rows `strike` too
 
 
 class Zeros(NamedTuple):

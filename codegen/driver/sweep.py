@@ -14,8 +14,9 @@ from ..simd.addresses import address
 from ..simd.lanes import any_lane, lane_bits, load, minimum, store
 from .cells import REPEATING, aligned, come_back, fill, finish, outcome, put, settle_down, turn_over, vacate
 from .clock_slots import *
-from .contacts import change_modes, note_rush, take_back
+from .contacts import change_modes
 from .control import accept_series, advance, aim, arrive, judge, pause, wrap
+from .passages import note_rush, take_back
 from .records import Friction, Results, Rows, Step
 from .spread import spread
 
@@ -130,17 +131,16 @@ def drive(functions, dims, multiplicity, rule, network, first, last, inputs, out
     # 1. Lay out the workspace: y_new, middle, contacts, clock, y, dense output, values of observables and of sections.
     size, dense_size = dims.dimension, dims.dense_rows * dims.dimension
     lane_size = CLOCK + 2 * size + dims.parameters + len(REPEATING)
-    contact_size = 9 * dims.nodes + 2 if CONTACTS else 0
     observed = len(rule) * (dims.observed + dims.gaps + dims.depths)
     crossed = (len(rule) + 1) * (dims.sections * (3 + max(0, dims.kept)) + 3 * dims.stops)
-    block = aligned((2 * size + lane_size + dense_size + dims.workspace + contact_size + observed + crossed) * WIDTH)
+    block = aligned((2 * size + lane_size + dense_size + dims.workspace + dims.contacts + observed + crossed) * WIDTH)
     y_new, middle, out = address(block, 0), address(block, size * WIDTH), address(block, 2 * size * WIDTH)
-    first_lane = (2 * size + contact_size) * WIDTH
+    first_lane = (2 * size + dims.contacts) * WIDTH
     clock, y = address(block, first_lane), address(block, first_lane + CLOCK * WIDTH)
     dense = address(block, first_lane + lane_size * WIDTH)
     seen = address(dense, (dense_size + dims.workspace) * WIDTH)
     crossings = address(seen, observed * WIDTH)
-    friction = Friction(middle, out, network, dims, functions.pushes)
+    friction = Friction(middle, out, clock, steering, network, dims, functions)
 
     # 2. All lanes are empty; tallies of cells that do not continue begin at 0.
     cell = np.full(WIDTH, -1)

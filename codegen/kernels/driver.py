@@ -69,9 +69,10 @@ class Driver:
     looped: bool = False
     contacts: bool = False
     series: bool = False  # True for Taylor steps, which choose their own length
+    rows: bool = False  # True if the contacts are rows
 
     def __str__(self) -> str:
-        traits = [name for name in ("looped", "contacts", "series") if getattr(self, name)]
+        traits = [name for name in ("looped", "contacts", "series", "rows") if getattr(self, name)]
         subject = {"sweep": "sweeps", "modes": "orbits and their modes", "frame": "frames of lifted networks"}[
             self.kind
         ]
@@ -82,7 +83,7 @@ class Driver:
         """Functions of the scene and recorders, in the order of the driver's arguments."""
         if self.kind is KernelKind.MODES:
             return "step", "carry", "pushes", "release"
-        return "step", "pushes", "section", "values", *RECORDERS
+        return "step", "pushes", *["strike"] * self.rows, "section", "values", *RECORDERS
 
     def recorder(self, entry: str) -> Recorder:
         # `tally` gets the values inside a step from a function of the scene, whatever the kind of step
@@ -107,7 +108,8 @@ class Driver:
             "LOOPED": self.looped,
             "SERIES": self.series,
         }
-        contacts, landings = (["contacts"], ["landings"]) if self.contacts else ([], [])
+        of_contacts = ["rows" if self.rows else "contacts", "passages"]
+        contacts, landings = (of_contacts, ["landings"]) if self.contacts else ([], [])
         frames = ["frames", "lifted_frames"] if self.kind is KernelKind.FRAME else []
         last = ["propagators", *landings, "frames", "modes"] if modes else ["spread", "sweep", *frames]
         pieces = (f"driver.{name}" for name in ("dense", "cells", "control", *contacts, *last))

@@ -123,6 +123,7 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
             strengths=len(variation.parameters),
             shared=shared,
             jumps=int(events is not None and bool(events.exits)),
+            rows=plain.n,
         ),
         (-1,) * variation.size if events is None else tuple(events.owners),
     )

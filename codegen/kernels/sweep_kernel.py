@@ -36,6 +36,7 @@ from ..simd import lanes
 from ..steps.blocks import NodeBlocks, analyse
 from ..steps.contact_step import push_functions
 from ..steps.looped_step import LoopedStep
+from ..steps.row_step import SIDES, most_rows, row_count, row_functions
 from ..steps.sparse_plan import FILL_LIMIT, SparsePlan, sparse_plan
 from ..steps.step import StepWriter, function_name, node_function, scaling
 from ..steps.unrolled_step import UnrolledStep
@@ -77,6 +78,7 @@ class SweepKernel(KernelSource):
         wanted = {
             "step": True,
             "pushes": self.driver.contacts,
+            "strike": self.driver.rows,
             "section": sizes.sections or sizes.stops,
             "values": sizes.observed,
         }
@@ -134,9 +136,11 @@ def emit(
         functions, scratch, count = _stages(plain, method, names, elimination)
     # stage 5: the driver
     width = _suited(equations, method, count) if width is None else width
-    chosen = Driver(KernelKind.SWEEP, width, looped, plain.sticks, method.series)
+    chosen = Driver(KernelKind.SWEEP, width, looped, plain.sticks, method.series, plain.has_rows)
     # stage 6: events and observed values, constants, sizes
-    events = [*push_functions(plain, names, looped), *recording.functions(named)]
+    written = row_functions if plain.has_rows else push_functions
+    events = [*written(plain, names, looped), *recording.functions(named)]
+    rows, felt = (row_count(plain), most_rows(plain)) if plain.has_rows else (plain.n if plain.sticks else 0, 0)
     functions += [driver.text("driver.dense")] if recording.has_functions else []
     functions += [driver.text("driver.slope")] if recording.has_rates else []
     constants = {
@@ -169,6 +173,9 @@ def emit(
             kept=recording.kept,
             sampled=int("trajectory" in recording.records) << int(recording.own_times),
             stops=int(recording.stop is not None),
+            rows=rows,
+            felt=felt,
+            contacts=SIDES * rows + 2 + (5 + felt) * rows if plain.sticks else 0,
         ),
         recording.multiplicity if compares and recording.multiplicity is not None else (1,) * equations.n,
         rule_of(method),

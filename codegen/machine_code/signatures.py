@@ -70,6 +70,7 @@ def _of_sweep(driver: Driver) -> tuple[dict[str, Any], tuple[Any, ...], tuple[An
     taken = {
         "step": result(*times, *[ADDRESS] * 4, NUMBER, NUMBER, *network),  # y, p, y_new, dense; rtol, atol
         "pushes": types.void(lane, *[ADDRESS] * 3, *network),  # t, y, p, output
+        "strike": types.void(lane, *[ADDRESS] * 3, *network),
         **recorder_signatures(driver.width),
     }
     arguments = (_sizes(Dimensions), VECTOR, MATRIX, types.Tuple(network))  # sizes, multiplicity, rule, network

@@ -58,12 +58,12 @@ def _columns(event: Event) -> tuple[sp.Expr, ...]:
     return event.level, event.target, *event.limits, *event.departures
 
 
-def _gaps(template: Node | Edge) -> list[sp.Expr]:
+def time_gaps(template: Node | Edge) -> list[sp.Expr]:
     """Return the functions of time whose zeros are jumps or kinks of the right-hand side, sorted."""
     return sorted(gaps(template), key=sp.default_sort_key)
 
 
-def _sides(zeros: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
+def jump_sides(zeros: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
     """Return two numbers, at t and soon after, that change if any of `zeros` changes sign; () if there are no zeros."""
     # the signs are digits in base 3; a double holds 30 digits exactly
     signs = [3 ** (k % 30) * sp.sign(gap) for k, gap in enumerate(dict.fromkeys(zeros))]
@@ -75,13 +75,13 @@ def _written_out(equations: Equations, names: Names) -> list[Statement]:
     n = equations.n
     events = [event for i in range(n) for event in equations.events_at(i)]
     columns = [e for column in zip(*map(_columns, events), strict=True) for e in column]
-    zeros = [e.xreplace(equations.at_node(i)) for i in range(n) for e in _gaps(equations.node_at(i))]
-    zeros += [e.xreplace(equations.at_link(link, edge)) for link, edge in equations.linked() for e in _gaps(edge)]
-    body = share([*columns, *_sides(zeros)], names.fresh("z"))
+    zeros = [e.xreplace(equations.at_node(i)) for i in range(n) for e in time_gaps(equations.node_at(i))]
+    zeros += [e.xreplace(equations.at_link(link, edge)) for link, edge in equations.linked() for e in time_gaps(edge)]
+    body = share([*columns, *jump_sides(zeros)], names.fresh("z"))
     states = [let(name, Load("y", Number(k))) for k, name in enumerate(equations.state) if real(name) in body.symbols]
     places = [*range(len(columns)), *(SIDES * n + k for k in range(2))]
     stores = [store("out", k, lane(lower(e))) for k, e in zip(places, body.results, strict=False)]
-    return [*states, *_parameters(equations, body.symbols), *assigned(body), *stores]
+    return [*states, *parameter_loads(equations, body.symbols), *assigned(body), *stores]
 
 
 def _looped(equations: Equations, names: Names) -> list[Statement]:
@@ -96,10 +96,10 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
     # skip jumps in time whose parameters differ from node to node or link to link: step control handles them
     differing = set(map(real, (*equations.varied, *equations.numbered)))
     parts: tuple[Node | Edge, ...] = (node, *equations.edges)
-    zeros = [e for part in parts for e in _gaps(part) if not e.free_symbols & differing]
-    sides = share(_sides(zeros), names.fresh("side"))
+    zeros = [e for part in parts for e in time_gaps(part) if not e.free_symbols & differing]
+    sides = share(jump_sides(zeros), names.fresh("side"))
     used = body.symbols.union(sides.symbols, *(e.free_symbols for e in (*fixed.table, *force)))
-    statements = [*_parameters(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]
+    statements = [*parameter_loads(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]
     statements += assigned(sides)
     statements += [store("out", SIDES * Name("NODES") + k, lane(lower(e))) for k, e in enumerate(sides.results)]
     loop: list[Statement] = [let(s.name, Load("y", places.place(k))) for k, s in enumerate(node.state) if s in used]
@@ -127,7 +127,7 @@ def _force(equations: Equations, places: StateLayout, event: Event) -> tuple[lis
     return [*loop, *(accumulate("out", places.place(k), "f_link") for k in ACCELERATIONS)], (force,)
 
 
-def _parameters(equations: Equations, used: set[sp.Symbol]) -> list[Statement]:
+def parameter_loads(equations: Equations, used: set[sp.Symbol]) -> list[Statement]:
     first = equations.dimension
     return [let(p, Load("p", Number(first + k))) for k, p in enumerate(equations.parameters) if real(p) in used]
 

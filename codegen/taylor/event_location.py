@@ -128,14 +128,16 @@ class Stored(NamedTuple):
 
 
 def closings(mode: str, exact: bool, gaps: Sequence[Stored], stuck: str, room: Expression) -> list[Statement]:
-    """Return the statements that end a step where one of the two gaps of a contact closes.
+    """Return the statements that end a step where one of the gaps of a contact or row closes.
 
     stuck: name of the variable that is 1 in stick and 0 in slip; room: memory for the coefficients of a gap.
     """
     late = 0.0 * Name("t") if exact else LATE * Name(stuck)
-    statements: list[Statement] = [let(stuck, plus(ONE, Negation(Name(mode) * Name(mode))))]
+    statements: list[Statement] = []
+    if len(gaps) > 1:
+        statements.append(let(stuck, plus(ONE, Negation(Name(mode) * Name(mode)))))
     # the first gap can close in stick and in slip, the second gap only in stick
-    for side, gap in zip((ONE + 0.0 * Name("t"), Name(stuck)), gaps, strict=True):
+    for side, gap in zip((ONE + 0.0 * Name("t"), Name(stuck)), gaps, strict=False):
         coefficients = ("dense", gap.first, room, gap.order, "passed")
         statements.append(let("passed", call("closing", side, late, gap.size, "nearest", *coefficients)))
     return statements

@@ -51,8 +51,8 @@ def convolution(dense, left, right, k, first, end):
 '''.strip()
 """Text of the function that computes convolutions; a loop in each sum would take most of the compilation time."""
 
-GAPS = (Name("i"), Name("NODES") + "i")
-"""Indices of the two gaps of node i's contact, among the gaps of one order."""
+GAPS = (Name("i"), *(k * Name("NODES") + "i" if k > 1 else Name("NODES") + "i" for k in range(1, 16)))
+"""Indices of the gaps of node i's contact or rows, among the gaps of one order."""
 
 START, ORDER = Number(0), Name("k")
 """Order 0, with which a step begins, and the variable of the loop over all later orders."""
@@ -314,8 +314,8 @@ def polynomial(name: str, degree: int, coefficient: Callable[[Expression], Expre
 
 
 def with_gaps(node: Node) -> list[sp.Expr]:
-    """Return the rates of a node, followed by the two gaps of each event."""
-    return [*node.rhs, *(gap for event in node.events for gap in event.gaps)]
+    """Return the rates of a node, followed by the gaps of each event and row."""
+    return [*node.rhs, *(gap for event in (*node.events, *node.rows) for gap in event.gaps)]
 
 
 def symbols_in(expressions: Iterable[sp.Expr]) -> set[sp.Symbol]:
@@ -392,6 +392,13 @@ class LoopedSeries(TaylorStepWriter):
     def pushes(joint: Joint) -> list[sp.Expr]:
         """Return a link's contributions to the rates of its target, and to the contact's gaps (force in stick)."""
         edge = joint.edge
+        if joint.target.rows:
+            size = len(joint.target.continuous)
+            here = dict(zip(joint.target.state, edge.here, strict=True))
+            off = dict.fromkeys(edge.here[size:], sp.S.One)
+            plain = [e.xreplace(off) for e in edge.rhs[:size]]
+            rows = [row.map(lambda e: e.xreplace(here)) for row in joint.target.rows]
+            return [*edge.rhs, *(e for row in rows for e in row.gained(plain))]
         if not joint.target.events:
             return list(edge.rhs)
         mode = edge.here[2]
@@ -412,11 +419,14 @@ class LoopedSeries(TaylorStepWriter):
         # sums over links read functions of the source nodes from memory
         self.node_part, self.lent = section, series[size:]
         section.lent += [s for s in series[size:] if not isinstance(s, Constant)]
-        for event in node.events:
-            rise, fall = (Outer(Slot("gaps", index)) for index in GAPS)
-            up, down = (Load("dense", plus(Name("at_sizes"), index)) for index in GAPS)
-            mode, room = self.called[event.mode.name], Name("at_closing")
-            section.contacts.append(Gaps(mode, "stuck", (rise, fall), ("rise", "fall"), (up, down), room))
+        first = 0
+        for event in (*node.events, *node.rows):
+            indices = GAPS[first : first + len(event.gaps)]
+            first += len(indices)
+            series = tuple(Outer(Slot("gaps", index)) for index in indices)
+            sizes = tuple(Load("dense", plus(Name("at_sizes"), index)) for index in indices)
+            mode, names = self.called.get(event.mode.name, "t"), ("rise", "fall")[: len(indices)]
+            section.contacts.append(Gaps(mode, "stuck", series, names, sizes, Name("at_closing")))
         return section
 
     def link(self, joint: Joint, hoisted: Hoisted) -> SeriesLoop:
@@ -573,7 +583,8 @@ class LoopedSeries(TaylorStepWriter):
         if self.waves.lent:
             rooms["t"] = terms
         if eq.sticks:
-            rooms |= {"gaps": terms * 2 * eq.n, "sizes": 2 * eq.n, "closing": terms}
+            gaps = max(len(with_gaps(node)) - len(node.rhs) for node in eq.nodes) * eq.n
+            rooms |= {"gaps": terms * gaps, "sizes": gaps, "closing": terms}
         for section in self.parts:
             rooms |= section.room()
         return rooms

@@ -202,7 +202,7 @@ class Ratio(Series):
     LINEAR, CONVOLVED = ("above",), ("self", "below")
 
     def begin(self, at: Order) -> Expression:
-        self.inverse = at.save(f"i_{self.below.name}", over(ONE, at.of(self.below)))
+        self.inverse = at.save(f"i_{self.below.name or self.name}", over(ONE, at.of(self.below)))
         return times(at.of(self.above), self.inverse)
 
     def coefficient(self, at: Order) -> Expression:

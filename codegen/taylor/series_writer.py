@@ -22,7 +22,7 @@ from .step_length import distant, last_orders, unseen
 
 @dataclass(frozen=True, slots=True)
 class Gaps:
-    """Taylor series of the two gaps of a contact (`Event.gaps`), its mode, and sizes of the terms of coefficient 0.
+    """Taylor series of the gaps of a contact or row (`Event.gaps`), its mode, and sizes of the terms of coefficient 0.
 
     The sizes bound rounding errors.
 
@@ -32,9 +32,9 @@ class Gaps:
 
     mode: str
     stuck: str
-    series: tuple[Series, Series]
-    names: tuple[str, str]
-    sizes: tuple[Expression, Expression]
+    series: tuple[Series, ...]
+    names: tuple[str, ...]
+    sizes: tuple[Expression, ...]
     room: Expression
 
 

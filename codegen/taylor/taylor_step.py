@@ -87,7 +87,7 @@ class TaylorStepWriter(ABC):
     """Write the step of some order for equations with names that are free in generated code (`tidy`).
 
     `parts`: the groups of series that are computed together. `exact`: True if the slip of some contact begins with a
-    jump of acceleration; loads of contacts then need the full tolerance.
+    jump of acceleration, or for rows; loads of contacts then need the full tolerance.
     """
 
     parts: Sequence[SeriesWriter]
@@ -95,7 +95,7 @@ class TaylorStepWriter(ABC):
 
     def __init__(self, equations: Equations, order: int, symbols: Collection[str]) -> None:
         self.equations, self.order = equations, order
-        self.exact = any(event.jumps for node in equations.nodes for event in node.events)
+        self.exact = equations.has_rows or any(event.jumps for node in equations.nodes for event in node.events)
         self.called, self.time = called(symbols), Time(name="t")
         self.substitutes: dict[sp.Symbol, sp.Expr] = {real(old): real(new) for old, new in self.called.items()}
 

@@ -223,11 +223,12 @@ class UnrolledSeries(TaylorStepWriter):
         eq, shared = self.equations, self.supply.fresh("shared_")
         moving, constant = self.of_network()
         for i in range(eq.n):
-            for event in eq.events_at(i):
-                rise, fall = self.graph.read(Template.of(event.gaps, moving, shared), moving, constant)
-                name, room = self.called[event.mode.name], Number(self.lines.room + 2 * (self.order + 1))
-                sizes = (f"size_{name}_rise", f"size_{name}_fall")
-                yield Gaps(name, f"stuck_{name}", (rise, fall), sizes, (Name(sizes[0]), Name(sizes[1])), room)
+            for k, event in enumerate((*eq.events_at(i), *eq.rows_at(i))):
+                series = tuple(self.graph.read(Template.of(event.gaps, moving, shared), moving, constant))
+                name = self.called.get(event.mode.name, f"guard_{i}_{k}")
+                sizes = tuple(f"size_{name}_{way}" for way in ("rise", "fall")[: len(series)])
+                room = Number(self.lines.room + 2 * (self.order + 1))
+                yield Gaps(name, f"stuck_{name}", series, sizes, tuple(map(Name, sizes)), room)
 
     def of_network(self) -> Symbols:
         """Return the series, or the constants, for the symbols of the whole network."""

@@ -21,6 +21,7 @@ from ..inputs.names import LinkName
 from ..interactions.separation import separated
 from ..mechanics.components import Block, Edge, Node
 from ..mechanics.events import Event
+from ..mechanics.rows import Row
 
 Ends = tuple[int, int]
 """The kinds of a link's target and source."""
@@ -241,8 +242,18 @@ class Equations(_Cached, HasLatex):
 
     @property
     def sticks(self) -> bool:
-        """True if friction is set-valued, so that nodes stick and slip."""
-        return any(node.events for node in self.nodes)
+        """True if nodes have events, such as the stick and slip of set-valued friction."""
+        return any(node.sticks for node in self.nodes)
+
+    @property
+    def has_rows(self) -> bool:
+        """True if events are rows (`synchain.models.mechanics.rows`)."""
+        return any(node.rows for node in self.nodes)
+
+    @property
+    def modes(self) -> frozenset[str]:
+        """The components that change only at events."""
+        return frozenset(mode.name for node in self.nodes for mode in node.modes)
 
     @cached_property
     def dimension(self) -> int:
@@ -352,6 +363,21 @@ class Equations(_Cached, HasLatex):
         # mode is set to 1.
         return tuple(e.under(force.xreplace({e.mode: sp.S.One, velocity: e.target})) for e in events)
 
+    def rows_at(self, i: int) -> tuple[Row, ...]:
+        """Return the rows of node `i` (0-based) under the rates that its links add, in the symbols of the network."""
+        node = self.node_at(i)
+        if not node.rows:
+            return ()
+        at_node, off = self.at_node(i), dict.fromkeys(map(self.at_node(i).__getitem__, node.modes), sp.S.One)
+        size = len(node.continuous)
+        added = [sp.S.Zero] * size
+        for link, edge in self.linked():
+            if link[0] == i:
+                # links are projected where rows are held: with no row held they have their full rates
+                rates = (e.xreplace(self.at_link(link, edge)).xreplace(off) for e in edge.rhs[:size])
+                added = [a + e for a, e in zip(added, rates, strict=True)]
+        return tuple(row.map(lambda e: e.xreplace(at_node)).under(added) for row in node.rows)
+
     def rhs(self) -> tuple[sp.Expr, ...]:
         """Return the right-hand side in state order; meant for small n, since the algebra grows with n."""
         rates = self._of_nodes([node.rhs for node in self.nodes])
@@ -430,6 +456,7 @@ class Equations(_Cached, HasLatex):
         links = repr([layer.links for layer in self.layers] if large else tuple(self.links))
         parts = [_text(first.state, first.rhs, first.parameters), str(self.n), links]
         parts += ["; ".join(map(sp.srepr, event.expressions)) for event in first.events]
+        parts += [f"{row.law} {'; '.join(map(sp.srepr, row.expressions))}" for node in self.nodes for row in node.rows]
         parts += [sp.srepr(sp.Matrix(node.inertia)) for node in self.nodes if node.inertia]
         parts += [f"varied {' '.join(self.varied)}"] if self.varied else []
         if others:  # several kinds of nodes
@@ -496,12 +523,10 @@ def check(eq: Equations) -> None:
 
 def _check_friction(eq: Equations) -> None:
     """Raise ValueError for networks in which set-valued friction is not supported."""
-    if eq.mixed:
-        raise ValueError(
-            "nodes of several kinds: found set-valued friction; expected smooth contacts; use contact 'atan'"
-        )
-    if eq.inertial:
+    if eq.inertial_links:
         raise ValueError("links with inertia: found set-valued friction; expected a smooth contact; use contact 'atan'")
+    if eq.has_rows:
+        return
     if len(eq.layers) > 1 or any(edge.forced or edge.theirs for edge in eq.edges):
         found = "several layers" if len(eq.layers) > 1 else "time, or a parameter of the source that differs,"
         raise ValueError(

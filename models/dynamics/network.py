@@ -23,11 +23,12 @@ from ..interactions.separation import separated
 from ..mechanics.calculus import cancelled, expanded
 from ..mechanics.components import WEIGHT_NUMBER, Block, Edge, Node
 from ..mechanics.contact import KAPPA, SLIDING, ContactModel, FrictionLaw, regularise
-from ..mechanics.events import set_valued
+from ..mechanics.events import on_steady_ground, set_valued
 from ..mechanics.lagrangian import LARGEST_BY_MINORS, check_masses_exist, coupled, solve_masses
 from ..mechanics.nondimensional import friction_coefficient, nondimensional, scale, static_coefficient
 from ..mechanics.oscillator import FRICTION, FieldModel, LagrangianModel, Oscillator
 from ..mechanics.parameter import Parameter
+from ..mechanics.rows import Surface, friction_surface, with_rows
 from .equations import Equations, Layer
 
 FEW = 8
@@ -60,8 +61,15 @@ def parameters(
 
 
 @lru_cache(maxsize=64)
-def node(oscillator: Oscillator, friction: FrictionLaw | None = None, contact: str = ContactModel.ATAN) -> Node:
+def node(
+    oscillator: Oscillator,
+    friction: FrictionLaw | None = None,
+    contact: str = ContactModel.ATAN,
+    rows: bool = False,
+) -> Node:
     """Derive the equations of one oscillator; for a Lagrangian, x' = v and the Euler-Lagrange equations for v'.
+
+    rows: write friction of one coordinate on a steady ground as a row too, as networks of several kinds need it.
 
     Raises ValueError as `parameters` does.
     """
@@ -87,14 +95,57 @@ def node(oscillator: Oscillator, friction: FrictionLaw | None = None, contact: s
     # The friction law takes the place of the unknown function f(w).
     coefficient = friction_coefficient(friction, contact)
     if contact == ContactModel.SET_VALUED and friction.jumps:
-        if len(accelerations) != 1:
-            raise ValueError(f"set-valued contact: the oscillator has {len(accelerations)} coordinates; expected one")
         w = sp.Dummy("w", real=True)
-        (x,), (v,) = positions, velocities
-        rate, event = set_valued(accelerations[0], FRICTION, coefficient(w), w, static_coefficient(friction), x, v)
-        return Node((x, v, event.mode), (v, event.mode**2 * rate, sp.S.Zero), symbols, (event,), coefficient(SLIDING))
+        law, static = coefficient(w), static_coefficient(friction)
+        if not rows and on_steady_ground(accelerations, FRICTION, positions, velocities):
+            (x,), (v,) = positions, velocities
+            rate, event = set_valued(accelerations[0], FRICTION, law, w, static, v)
+            return Node(
+                (x, v, event.mode), (v, event.mode**2 * rate, sp.S.Zero), symbols, (event,), law=coefficient(SLIDING)
+            )
+        if inertia:
+            raise ValueError(
+                f"set-valued contact: found {len(coupled(masses))} coordinates that the masses couple; expected at most "
+                f"{LARGEST_BY_MINORS}; use contact 'atan'"
+            )
+        speeds = dict(zip(velocities, positions, strict=True))
+        smooth, surfaces = _contacts(accelerations, speeds, law, w, static)
+        state, rates, held = with_rows((*positions, *velocities), (*velocities, *smooth), surfaces, speeds)
+        return Node(state, rates, symbols, rows=held, law=coefficient(SLIDING))
     rates = (e.replace(FRICTION, coefficient) for e in accelerations)
     return Node((*positions, *velocities), (*velocities, *rates), symbols, law=coefficient(SLIDING), inertia=inertia)
+
+
+def _contacts(
+    accelerations: Sequence[sp.Expr],
+    speeds: Mapping[sp.Symbol, sp.Symbol],
+    law: sp.Expr,
+    argument: sp.Symbol,
+    static: sp.Expr | None,
+) -> tuple[list[sp.Expr], list[Surface]]:
+    """Return the accelerations without friction, and the row of each contact f(w)."""
+    velocities = list(speeds)
+    applied = sorted(
+        {f for e in accelerations for f in e.atoms(FRICTION)},
+        key=lambda f: ([not f.has(v) for v in velocities], sp.default_sort_key(f)),
+    )
+    swap = {f: sp.Dummy(f"f{k}", real=True) for k, f in enumerate(applied)}
+    plain = [e.xreplace(swap) for e in accelerations]
+    smooth, surfaces = [e.xreplace(dict.fromkeys(swap.values(), sp.S.Zero)) for e in plain], []
+    for f, coefficient in swap.items():
+        pull = [e.diff(coefficient) for e in plain]
+        if any(e.has(*swap.values()) for e in pull):
+            raise ValueError(f"set-valued contact: {f} acts nonlinearly; expected a multiple of it in the forces")
+        sliding = sp.expand(f.args[0])
+        slopes = [sliding.diff(v) for v in velocities]
+        if all(e == 0 for e in slopes) or any(e.has(*velocities) for e in slopes):
+            raise ValueError(
+                f"set-valued contact: found the sliding velocity {sliding}; expected a linear function of velocities"
+            )
+        felt = [v for v, e in zip(velocities, slopes, strict=True) if e != 0]
+        surface = friction_surface(sliding, (*[sp.S.Zero] * len(pull), *pull), law, argument, static)
+        surfaces.append(replace(surface, name=speeds[felt[0]].name if len(felt) == 1 else ""))
+    return smooth, surfaces
 
 
 def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str, remedy: str = "rename it") -> None:

@@ -82,6 +82,15 @@ def _releases(orbit: Equations) -> tuple[tuple[_Release, _Release], ...]:
     return tuple(releases)
 
 
+def check_tangents(equations: Equations) -> None:
+    """Raise ValueError for events whose saltation matrices are not supported."""
+    if equations.has_rows:
+        raise ValueError(
+            "tangent dynamics: found contacts of several coordinates, moving grounds or kinds, stops, resets or surfaces; "
+            "expected friction of one coordinate on a ground of constant velocity; run the network itself"
+        )
+
+
 def _check_springs(edges: Iterable[Edge]) -> None:
     """Raise ValueError for links that act on velocities.
 
@@ -106,6 +115,7 @@ def of_mode(
     """Return the events of a mode of the synchronous orbit, on which the forces of links vanish."""
     if not orbit.sticks:
         return None
+    check_tangents(equations)
     releases = _releases(orbit)
     if releases:
         _check_springs(equations.edges)
@@ -126,6 +136,7 @@ def of_network(equations: Equations) -> Events | None:
     n = equations.n
     if not equations.sticks:
         return None
+    check_tangents(equations)
 
     def entries(i: int, side: _Release) -> tuple[Entry, ...]:
         return tuple(((n + i, j), side.lead * g) for j, g in enumerate(side.gradient) if g != 0)

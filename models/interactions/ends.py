@@ -165,5 +165,6 @@ def directed(energy: sp.Expr, exchanged: sp.Expr) -> tuple[sp.Expr, bool]:
 
 def has_velocities(node: Node) -> bool:
     """Return True if the states of a node are coordinates followed by their velocities."""
-    half = len(node.state) // 2
-    return bool(node.events) or node.rhs[:half] == node.state[half:]
+    states = node.continuous
+    half = len(states) // 2
+    return node.rhs[:half] == states[half:]

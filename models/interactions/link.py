@@ -18,6 +18,7 @@ from ..mechanics.components import TIME, Block, Edge, Node
 from ..mechanics.lagrangian import Mechanics, mass_matrix, solve_masses
 from ..mechanics.nondimensional import nondimensional
 from ..mechanics.oscillator import FieldModel, Oscillator
+from ..mechanics.rows import projection
 from .coupling import WEIGHT, Coupling
 from .ends import Pair, Terms
 
@@ -45,6 +46,8 @@ def edge(
         plain = Node(single.state[:2], (single.state[1], sp.S.Zero), single.parameters)
         (event,) = single.events
         return _on_sliding(edge(coupling, plain, oscillator), event.mode)
+    if single.sticks or (other is not None and other.sticks):
+        return _on_rows(coupling, single, oscillator, other, partner)
     coupling.check_ends(single, other)
     pair = Pair((single, other or single), (oscillator, partner or oscillator))
     terms = coupling.terms(pair)
@@ -122,6 +125,43 @@ def _on_sliding(plain: Edge, mode: sp.Symbol) -> Edge:
     here, there = (sp.Symbol(f"{mode.name}_{end}", real=True) for end in "ij")
     rates = (sp.S.Zero, here**2 * plain.rhs[1], sp.S.Zero)
     return replace(plain, here=(*plain.here, here), there=(*plain.there, there), rhs=rates)
+
+
+def _on_rows(
+    coupling: Coupling, single: Node, oscillator: Oscillator | None, other: Node | None, partner: Oscillator | None
+) -> Edge:
+    """Return a link to a node with rows, whose held rows balance the link; see `rows.projection`."""
+    plain = edge(coupling, _without_rows(single), oscillator, None if other is None else _without_rows(other), partner)
+    if plain.inertia:
+        raise ValueError(
+            "links with inertia: found events of a node; expected links without inertia; use contact 'atan'"
+        )
+    target, source = single, other or single
+    here, there = (
+        tuple(sp.Symbol(f"{mode.name}_{end}", real=True) for mode in node.modes)
+        for node, end in ((target, "i"), (source, "j"))
+    )
+    swap = dict(zip(target.state, (*plain.here, *here), strict=True))
+    rates = tuple(
+        e.xreplace(swap) for e in projection([row.map(lambda e: e.xreplace(swap)) for row in target.rows], plain.rhs)
+    )
+    known = {*plain.parameters, *(s for s, _ in plain.theirs)}
+    used = {s for e in rates for s in e.free_symbols}
+    parameters = (*plain.parameters, *(p for p in target.parameters if p in used and p not in known))
+    return replace(
+        plain,
+        here=(*plain.here, *here),
+        there=(*plain.there, *there),
+        rhs=(*rates, *[sp.S.Zero] * len(here)),
+        parameters=parameters,
+    )
+
+
+def _without_rows(node: Node) -> Node:
+    """Return a node of the continuous states alone; links need only those of its rates that no row changes."""
+    modes = set(node.modes)
+    rates = (sp.S.Zero if e.free_symbols & modes else e for e in node.rhs[: len(node.continuous)])
+    return Node(node.continuous, tuple(rates), node.parameters, inertia=node.inertia)
 
 
 def _in_differences(e: sp.Expr, pairs: list[tuple[sp.Symbol, sp.Symbol]], here: Symbols) -> sp.Expr:

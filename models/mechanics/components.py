@@ -10,6 +10,7 @@ import sympy as sp
 
 from .calculus import derivative
 from .events import Event
+from .rows import Law, Row
 
 TIME = sp.Symbol("t", real=True)
 """Non-dimensional time, the one time symbol of all equations."""
@@ -25,10 +26,11 @@ WEIGHT_NUMBER = sp.Symbol("W", real=True)
 class Node:
     """One uncoupled oscillator: M d(state)/dt = rhs(state, t; parameters)."""
 
-    state: tuple[sp.Symbol, ...]  # continuous states, then the mode of an event, which changes only at events
+    state: tuple[sp.Symbol, ...]  # continuous states, then the modes of events and rows, which change only at events
     rhs: tuple[sp.Expr, ...]  # the right-hand side of each state: its rate where M is the identity
     parameters: tuple[sp.Symbol, ...]
-    events: tuple[Event, ...] = ()  # set-valued friction has one; a node has at most one
+    events: tuple[Event, ...] = ()  # friction of one coordinate on a ground of constant velocity: at most one
+    rows: tuple[Row, ...] = ()  # all other surfaces at which rates jump or states are reset
     law: sp.Expr | None = field(default=None, compare=False)  # friction coefficient in terms of `SLIDING`, for printing
     inertia: Block = ()  # m(state; parameters), a row and a column for each state; empty if M is the identity
 
@@ -41,8 +43,10 @@ class Node:
             if self.state[2:3] != (event.mode,):
                 raise ValueError(f"a node with set-valued friction has the states x, v, slip, …; found {self.state}")
             _check("contact", event.expressions, len(event.expressions), declared)
-        if self.inertia and self.events:
-            raise ValueError("node: found set-valued friction beside a mass matrix; expected one coordinate")
+        for row in self.rows:
+            _check("row", row.expressions, len(row.expressions), declared | {row.mode})
+        if self.inertia and self.sticks:
+            raise ValueError("node: found events beside a mass matrix; expected at most three coupled coordinates")
         if self.inertia and len(self.inertia) != size:
             raise ValueError(
                 f"node: found a mass matrix of {len(self.inertia)} rows; expected one for each of {size} states"
@@ -61,13 +65,23 @@ class Node:
 
     @property
     def continuous(self) -> tuple[sp.Symbol, ...]:
-        """The states that change continuously: all states except the mode of an event."""
-        return self.state[:2] if self.events else self.state
+        """The states that change continuously: all states except modes."""
+        return self.state[: len(self.state) - len(self.modes)]
+
+    @property
+    def modes(self) -> tuple[sp.Symbol, ...]:
+        """The states that change only at events, behind the continuous ones."""
+        return (*(e.mode for e in self.events), *(row.mode for row in self.rows if row.law is not Law.RESET))
+
+    @property
+    def sticks(self) -> bool:
+        """True if the node has events."""
+        return bool(self.events or self.rows)
 
     @property
     def expressions(self) -> tuple[sp.Expr, ...]:
         """The right-hand side, the conditions of events and the entries of M."""
-        conditions = (e for event in self.events for e in event.expressions)
+        conditions = (e for event in (*self.events, *self.rows) for e in event.expressions)
         return (*self.rhs, *conditions, *_entries((self.inertia,)))
 
     @property
@@ -78,10 +92,10 @@ class Node:
     def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Node:
         """Return the node with every symbol and expression changed."""
         state, rhs, parameters = (tuple(map(change, part)) for part in (self.state, self.rhs, self.parameters))
-        events = tuple(event.map(change) for event in self.events)
+        events, rows = (tuple(event.map(change) for event in each) for each in (self.events, self.rows))
         # Drop parameters that `change` replaced by numbers.
         return Node(
-            state, rhs, tuple(p for p in parameters if p.is_Symbol), events, inertia=_mapped(self.inertia, change)
+            state, rhs, tuple(p for p in parameters if p.is_Symbol), events, rows, inertia=_mapped(self.inertia, change)
         )
 
     def without_unused_parameters(self, needed: Container[sp.Symbol] = ()) -> Node:

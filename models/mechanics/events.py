@@ -12,7 +12,7 @@ Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer,
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -65,13 +65,29 @@ class Event:
         return any(sp.simplify(a - b) != 0 for a, b in zip(self.limits, self.departures, strict=True))
 
 
+def on_steady_ground(
+    accelerations: Sequence[sp.Expr],
+    friction: sp.Function,
+    positions: Sequence[sp.Symbol],
+    velocities: Sequence[sp.Symbol],
+) -> bool:
+    """Return True for friction that acts once, on one coordinate, against a ground of constant velocity."""
+    applied = {f for e in accelerations for f in e.atoms(friction)}
+    if len(accelerations) != 1 or len(applied) != 1:
+        return False
+    sliding, (velocity,) = sp.expand(applied.pop().args[0]), velocities
+    slope = sliding.diff(velocity)
+    return bool(slope.is_number) and not sp.expand(sliding - slope * velocity).has(
+        *positions, sp.Symbol("t", real=True)
+    )
+
+
 def set_valued(
     acceleration: sp.Expr,
     friction: sp.Function,
     law: sp.Expr,
     argument: sp.Symbol,
     static: sp.Expr | None,
-    position: sp.Symbol,
     velocity: sp.Symbol,
 ) -> tuple[sp.Expr, Event]:
     """Return the acceleration in slip and the event of set-valued friction for an acceleration with friction(w)."""
@@ -85,12 +101,6 @@ def set_valued(
     if not (slope.is_number and slope.is_negative):
         raise ValueError(f"set-valued contact: the sliding velocity {sliding} must fall with {velocity}, linearly")
     ground = sp.solve(sliding, velocity)[0]
-    for symbol in (position, sp.Symbol("t", real=True)):
-        if ground.has(symbol):
-            raise ValueError(
-                f"set-valued contact: found a ground with the velocity {ground}, which changes with {symbol}; "
-                "expected a ground of constant velocity; use contact 'atan'"
-            )
 
     # The coefficients f(0+) of slow slip and f_s of stick.
     moving = in_slip(law, argument)

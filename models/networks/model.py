@@ -73,7 +73,9 @@ class Model:
     parameters: FrozenDict[Parameter] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "unlinked", _unlinked(self.kinds, self.kind_of, self.contact))
+        # Several kinds, several layers and forced links need events as rows.
+        rows = len(self.kinds) > 1 or len(self.linked) > 1 or any(coupling.forced for coupling, _ in self.linked)
+        object.__setattr__(self, "unlinked", _unlinked(self.kinds, self.kind_of, self.contact, rows))
         couplings = tuple(coupling for coupling, _ in self.linked)
         object.__setattr__(self, "parameters", _parameters(self.kinds, self.contact, couplings))
 
@@ -251,9 +253,9 @@ class Model:
 
 
 @lru_cache(maxsize=64)
-def _unlinked(kinds: tuple[NodeKind, ...], kind_of: tuple[int, ...], contact: ContactModel) -> Equations:
+def _unlinked(kinds: tuple[NodeKind, ...], kind_of: tuple[int, ...], contact: ContactModel, rows: bool) -> Equations:
     """Return the equations of nodes without links."""
-    nodes = [network.node(kind.oscillator, kind.friction, contact) for kind in kinds]
+    nodes = [network.node(kind.oscillator, kind.friction, contact, rows) for kind in kinds]
     return network.layered_network([kind.oscillator for kind in kinds], nodes, kind_of, ())
 
 

@@ -17,6 +17,7 @@ from ..inputs.checks import check_instance
 from ..mechanics.components import TIME, WEIGHT_NUMBER, Edge, Node
 from ..mechanics.contact import SLIDING
 from ..mechanics.oscillator import FRICTION
+from ..mechanics.rows import off_surfaces
 from .writer import ExpressionWriter, Latex, Style, Text
 
 LARGEST = 6
@@ -120,14 +121,20 @@ def _in_slip(equations: Equations) -> Equations:
     """Return the equations of slip for set-valued friction; stick modes are left out."""
     if not equations.sticks:
         return equations
+    modes = equations.modes
 
     def node(node: Node) -> Node:
-        rate = node.events[0].shown if node.events else node.rhs[1]
-        return Node(node.state[:2], (node.rhs[0], rate), node.parameters, law=node.law)
+        if node.rows:
+            return Node(node.continuous, off_surfaces(node.rhs, node.rows), node.parameters, law=node.law)
+        if not node.events:
+            return node
+        return Node(node.state[:2], (node.rhs[0], node.events[0].shown), node.parameters, law=node.law)
 
     def edge(edge: Edge) -> Edge:
-        rates = tuple(e.xreplace({edge.here[2]: sp.S.One}) for e in edge.rhs[:2])
-        return Edge(edge.here[:2], edge.there[:2], edge.weight, rates, edge.parameters)
+        here, there = ([s for s in end if s.name.rpartition("_")[0] not in modes] for end in (edge.here, edge.there))
+        free = {s: sp.S.One for s in edge.here if s not in here}
+        rates = tuple(e.xreplace(free) for e in edge.rhs[: len(here)])
+        return replace(edge, here=tuple(here), there=tuple(there), rhs=rates).without_unused_parameters()
 
     return equations.map_templates(node, edge)
 

@@ -23,7 +23,7 @@ from ..inputs.names import NodeName
 from ..inputs.unsupported import unsupported
 from ..interactions.coupling import Coupling
 from ..interactions.link import strength
-from ..mechanics.contact import SLIP, ContactModel, FrictionLaw
+from ..mechanics.contact import ContactModel, FrictionLaw
 from ..mechanics.oscillator import Oscillator
 from ..networks.layers import as_topology
 from ..networks.model import Group, Model
@@ -370,7 +370,7 @@ class Scene(HasDrawing, HasLatex):
         start: Mapping[str, object] | None = self.given["initial"]
         if start and not {"contact", "friction", "oscillator", "nodes"}.isdisjoint(changes):
             # Drop the modes of contacts: friction may have changed, and the modes follow from x and v.
-            start = {name: at for name, at in start.items() if name != SLIP.name}
+            start = {name: at for name, at in start.items() if name not in self.model.unlinked.modes}
         keywords = {**self.given, "initial": start, **changes}
         if keywords["links"] is not None:  # layers of links replace the coupling and the graph of a single layer
             keywords |= {"coupling": None, "topology": None} | changes

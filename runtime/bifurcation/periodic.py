@@ -29,7 +29,6 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import short_repr
 from synchain.models.inputs.keywords import warn
-from synchain.models.mechanics.contact import SLIP
 from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.run_keywords import Given
@@ -122,7 +121,7 @@ class PeriodicOrbit(Labelled):
     @property
     def components(self) -> tuple[str, ...]:
         """Names of the components of `state`."""
-        return tuple(name for name in self.scene.components if name != SLIP.name)
+        return tuple(name for name in self.scene.components if name not in self.scene.equations.modes)
 
     @property
     def data(self) -> xr.Dataset:
@@ -442,7 +441,7 @@ def _initial(scene: Scene) -> np.ndarray:
 
 def _state(scene: Scene, start: Sequence[float] | np.ndarray) -> np.ndarray:
     """Check a start and return it as the state (components,) of one oscillator, without a slip state."""
-    names = tuple(name for name in scene.components if name != SLIP.name)
+    names = tuple(name for name in scene.components if name not in scene.equations.modes)
     try:
         state = np.array(start, dtype=float)
     except (TypeError, ValueError):

@@ -23,7 +23,6 @@ import xarray as xr
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import check_integer, check_keys, check_number, check_table, short_repr
 from synchain.models.inputs.frozen import FrozenDict
-from synchain.models.mechanics.contact import SLIP
 from synchain.models.scenes.defaults import TimeUnit
 from synchain.models.scenes.scene import Scene, check_scene
 
@@ -248,7 +247,7 @@ def skeleton(
     warn_of_lost("skeleton", branches)
     # The box around all starts, by component.
     low, high = (of(np.concatenate(searched), axis=0).tolist() for of in (np.min, np.max))
-    names = (component for component in scene.components if component != SLIP.name)
+    names = (component for component in scene.components if component not in scene.equations.modes)
     return Skeleton(
         tuple(sorted(branches, key=lambda branch: (branch.orbits[0].periods, branch.values[0]))),
         FrozenDict({component: (a, b) for component, a, b in zip(names, low, high, strict=True)}),
@@ -269,7 +268,7 @@ def _box(scene: Scene, ranges: Mapping[str, Range]) -> np.ndarray:
 
     A component without a range has the scene's initial value twice.
     """
-    names = [name for name in scene.components if name != SLIP.name]
+    names = [name for name in scene.components if name not in scene.equations.modes]
     check_keys("skeleton: ranges", check_table("skeleton: ranges", ranges), names)
     ends = np.array([[scene.initial[name][0]] * 2 for name in names], dtype=float).T
     for name, interval in ranges.items():
@@ -380,7 +379,9 @@ def _returning(scene: Scene, path: np.ndarray, extent: np.ndarray, periods: int)
 
 def _first_start(scene: Scene) -> np.ndarray:
     """Return the initial state (components,) of the first oscillator, without a slip state."""
-    return np.array([values[0] for name, values in scene.initial.items() if name != SLIP.name], dtype=float)
+    return np.array(
+        [values[0] for name, values in scene.initial.items() if name not in scene.equations.modes], dtype=float
+    )
 
 
 def _same(orbit: PeriodicOrbit, other: PeriodicOrbit) -> bool:

@@ -11,6 +11,8 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
+from .row_modes import row_modes
+
 CLOCK = 8.0
 """Period of the clock of an oscillator without a drive: a power of two, so that no digit is lost."""
 
@@ -24,6 +26,8 @@ def with_modes(equations: Equations, start: np.ndarray, parameters: np.ndarray) 
     n = equations.n
     if not equations.sticks:
         return start
+    if equations.has_rows:
+        return row_modes(equations, start, parameters)
     (event,) = equations.node.events
     states = np.array(start, dtype=float)
     # Parameters (cells, 1), and (cells, n) where nodes differ.
@@ -76,7 +80,7 @@ def local_clock(equations: Equations, period: np.ndarray) -> np.ndarray:
     Times of events are read from the clock, with its rounding error. If time does not enter the equations, the period
     may have any length; a short one keeps the digits of events in long runs.
     """
-    if not equations.sticks or any(e.has(TIME) for e in equations.node.expressions):
+    if not equations.sticks or any(e.has(TIME) for node in equations.nodes for e in node.expressions):
         return period
     return np.full(len(period), CLOCK)
 

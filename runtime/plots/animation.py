@@ -104,6 +104,8 @@ def _belt_speeds(scene: Scene, cell: dict[str, float]) -> np.ndarray | None:
     except ValueError:  # several coordinates, or a ground that accelerates
         return None
     values = {**scene.parameters, **cell}
+    if equations.has_rows:
+        return None
     targets = [node.events[0].target for node in equations.nodes]
     speeds = [float(target.subs({s: values[s.name] for s in target.free_symbols})) for target in targets]
     return np.array([speeds[kind] for kind in equations.kind_of])

@@ -27,7 +27,6 @@ from synchain.models.dynamics.mode_inertia import inertia_of_modes
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.dynamics.variational import PHASE, Variation, mode
 from synchain.models.graphs.families import topology
-from synchain.models.mechanics.contact import SLIP
 from synchain.models.scenes.scene import Scene
 
 from ..cells.initial_modes import with_modes
@@ -267,7 +266,7 @@ def unit_of_time(scene: Scene) -> float:
 
 def pair_of(scene: Scene, **changes: Any) -> Scene:
     """Return a scene of two copies of a lone oscillator, with the same initial state."""
-    start = {name: values[0] for name, values in scene.initial.items() if name != SLIP.name}
+    start = {name: values[0] for name, values in scene.initial.items() if name not in scene.equations.modes}
     return scene.replace(topology=topology("chain", 2), initial=start, **changes)
 
 

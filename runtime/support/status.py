@@ -27,6 +27,7 @@ class Status(IntEnum):
     CHATTERING = 6
     STOPPED = 7
     PAUSED = 8
+    AMBIGUOUS = 9
 
     @property
     def message(self) -> str:
@@ -47,6 +48,8 @@ _MESSAGES = {
     "became undefined; begin on a bounded motion, such as an equilibrium, or shorten the time",
     Status.CHATTERING: "a contact changed between stick and slip hundreds of times while no time passed; "
     "check the friction law",
+    Status.AMBIGUOUS: "at an event several motions agree with the laws of the contacts, or none does: the load of a contact is "
+    "negative, motion leaves a surface on both sides, or stops that feel each other are hit at once; change the model there",
     Status.STOPPED: "met the stop condition of the scene before the end of the window",
     Status.PAUSED: "waits for another integrator",
     Status.INTERRUPTED: "stopped by the user before the end; run again with resume",

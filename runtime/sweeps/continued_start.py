@@ -11,7 +11,6 @@ import xarray as xr
 
 from synchain.codegen.driver.columns import SpanColumn
 from synchain.models.inputs.checks import typed_repr
-from synchain.models.mechanics.contact import SLIP
 from synchain.models.scenes.scene import Scene
 
 from ..cells.plan import Planner
@@ -49,7 +48,7 @@ def started(scene: Scene, start: StartValue) -> tuple[Scene, float]:
     _check_phases(scene, end)
     initial = {}
     for name in scene.components:
-        if name != SLIP.name:  # the modes of contacts follow from the other states
+        if name not in scene.equations.modes:  # the modes of contacts follow from the other states
             nodes = [scene.topology.labels[i] for i in scene.equations.holders(name)]
             initial[name] = [float(x) for x in end.sel(component=name, node=nodes).values]
     _expect_finite(np.array([x for values in initial.values() for x in values]))
@@ -97,7 +96,7 @@ def starts_of_cells(scene: Scene, start: Result | xr.DataArray) -> tuple[np.ndar
     labels = {"component": list(scene.equations.components), "node": list(scene.topology.labels)}
     table = _along(end.sel(labels), dims, STATE)
     starts = States.of(scene).flat(np.broadcast_to(table, (*scene.shape, *table.shape[-2:]))).reshape(scene.cells, -1)
-    modes = [k for k, name in enumerate(scene.equations.state) if name.rpartition("_")[0] == SLIP.name]
+    modes = [k for k, name in enumerate(scene.equations.state) if name.rpartition("_")[0] in scene.equations.modes]
     starts[:, modes] = np.array(scene.y0)[modes]  # slip modes follow from the other states
     _expect_finite(np.delete(starts, modes, axis=1))
     time = end.coords.get(END_TIME, xr.zeros_like(end.isel({name: 0 for name in STATE}, drop=True)))

@@ -18,7 +18,6 @@ import xarray as xr
 
 from synchain.models.inputs.checks import check_integer, check_number, check_table
 from synchain.models.inputs.words import Word
-from synchain.models.mechanics.contact import SLIP
 from synchain.models.scenes.defaults import TimeUnit
 from synchain.models.scenes.scene import Scene, check_scene
 
@@ -360,7 +359,7 @@ def _check(scene: Scene, samples: object, tolerance: object, confidence: object)
 
 def _box(scene: Scene, ranges: Mapping[str, Range] | None) -> dict[str, Range]:
     """Check the ranges, and return them in the order of the components, without the slip state of a contact."""
-    names = tuple(name for name in scene.components if name != SLIP.name)
+    names = tuple(name for name in scene.components if name not in scene.equations.modes)
     if ranges is None:
         return dict.fromkeys(names, (-1.0, 1.0))
     unknown = [name for name in check_table("basin: ranges", ranges) if name not in names]

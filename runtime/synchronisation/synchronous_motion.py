@@ -15,7 +15,6 @@ import numpy as np
 
 from synchain.codegen.driver.columns import SpanColumn
 from synchain.models.dynamics.equations import Equations
-from synchain.models.mechanics.contact import SLIP
 from synchain.models.scenes.scene import Scene
 
 from ..cells.paces import fastest_rates
@@ -76,7 +75,9 @@ def first_starts(scene: Scene, count: int) -> dict[str, list[float]] | None:
     """
     if scene.given["initial"] is None:
         return None
-    first = {name: (*values, values[0])[:2] for name, values in scene.initial.items() if name != SLIP.name}
+    first = {
+        name: (*values, values[0])[:2] for name, values in scene.initial.items() if name not in scene.equations.modes
+    }
     return {name: [a + k * (b - a) for k in range(count)] for name, (a, b) in first.items()}
 
 

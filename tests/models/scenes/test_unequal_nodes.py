@@ -256,8 +256,8 @@ def test_friction_laws_of_two_kinds() -> None:
     formulas = text(network.equations)
     assert "of node 1" in formulas
     assert "of node 2" in formulas
-    with pytest.raises(ValueError, match="nodes of several kinds: found set-valued friction"):
-        Scene(topology=chain(2), contact="set-valued", nodes=network.nodes).equations  # noqa: B018
+    rows = Scene(topology=chain(2), contact="set-valued", nodes=network.nodes).equations
+    assert rows.state == ("x_1", "x_2", "v_1", "v_2", "slip_1", "slip_2")
 
 
 def test_the_equations_of_ten_thousand_nodes_cost_no_algebra(monkeypatch) -> None:
@@ -340,9 +340,3 @@ def test_what_is_not_driven_is_named_as_the_nodes_are() -> None:
 def test_the_warning_of_a_coupling_that_does_not_vanish_reads_the_oscillator_of_the_nodes() -> None:
     pendulums = [{"oscillator": "double_pendulum", "at": [1, 2]}]
     assert Scene(nodes=pendulums, topology=chain(2), coupling="spring on phi").warnings == ()
-
-
-def test_set_valued_friction_beside_another_kind_is_refused_by_the_scene() -> None:
-    for other in ({"oscillator": "harmonic"}, {"oscillator": "friction", "friction": "viscous"}):
-        with pytest.raises(ValueError, match="several kinds: found set-valued friction; expected smooth contacts"):
-            Scene(contact="set-valued", topology=chain(2), nodes=[{**other, "at": [2]}])

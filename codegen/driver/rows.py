@@ -1,0 +1,400 @@
+"""Rows of nodes (models/mechanics/rows.py): their gaps, and which of them are held after an event.
+
+An event of a node has two parts.  Guards reset states and stops rebound: speeds jump.  Then all rows on their surfaces
+are decided together: of all sets of held rows that agree with the laws (held: |x| <= r, or x >= 0 at a stop; others leave
+the surface) the one with most held rows, then with fewest changes of mode, then with the least largest |x|.  Held rows
+are put on their surfaces, here and after each step.  If friction does not drop at the start of slip, that
+set is the only one if K is a P-matrix (Samelson, Thrall & Wesler, Proc. AMS 9, 805 (1958); Cottle, Pang & Stone, The
+Linear Complementarity Problem (Academic Press, 1992), chapter 3).  Else the cell ends as AMBIGUOUS.
+
+A stop whose rebounds would end soon is closed at once.  After a rebound with the speed u against the acceleration a the
+remaining ones take the time 2 u/(a (1 - e)) and pass on the same momentum as one plastic impact; the error is of the
+order u**3/(a**2 (1 - e)) (Budd & Dux, Phil. Trans. R. Soc. A 347, 365 (1994)).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ..simd.lanes import any_lane, broadcast, lane_bits, load, minimum, store
+from .cells import put
+from .clock_slots import *
+from .dense import inside
+
+# --- kernel text below ---
+# Groups of `pushes` and `strike`: six in front of the looks, the others behind the numbers on jumps in time.
+LEVEL, GAP, MODE, SPEED, RATE, RATIO, LAW, NUMBER, K = 0, 1, 2, 3, 4, 5, 9, 10, 11
+OF_SIGN, OF_STOP, OF_RESET = 0.0, 1.0, 2.0
+# What an event means for a row: nothing, its mode is known, it is decided, it lets go to the side of its force.
+UNTOUCHED, KNOWN, OPEN, RELEASED = 0.0, 1.0, 2.0, 3.0
+# Columns of the notes on rows: what the event means, mode and speed before, x before.
+ROLE, BEFORE, SPEED_BEFORE, X = 0, 1, 2, 3
+# A pivot, or a change of a speed, this much smaller than what it is the difference of is zero.
+NONE = 1e-12
+
+
+@njit(error_model="numpy", forceinline=True)
+def gap_of(i, p, out, dims):
+    """Return the gap of one row from the output of `pushes`."""
+    return load(out, dims.rows + i, WIDTH)
+
+
+@njit(error_model="numpy", forceinline=True)
+def push(t, y, p, friction):
+    """Compute the numbers of all rows at a state."""
+    if LOOPED:
+        graph, weights = friction.network
+        friction.functions.pushes(t, y, p, friction.out, graph, weights)
+    else:
+        friction.functions.pushes(t, y, p, friction.out)
+
+
+@njit(error_model="numpy", forceinline=True)
+def smallest_gap(t, y, p, friction):
+    """Return the smallest gap of all rows at a state."""
+    push(t, y, p, friction)
+    least = broadcast(1e300, WIDTH)
+    for i in range(friction.dims.rows):
+        least = minimum(least, gap_of(i, p, friction.out, friction.dims))
+    return least
+
+
+@njit(error_model="numpy")
+def gap_inside(theta, step, friction):
+    """Return the smallest gap at a fraction of the step."""
+    for c in range(friction.dims.dimension):
+        store(friction.middle, c, inside(theta, c, step.y, step.y_new, step.dense, friction.dims))
+    return smallest_gap(step.t + theta * step.h, friction.middle, step.y, friction)
+
+
+@njit(error_model="numpy", forceinline=True)
+def place(group, row, dims):
+    """Return the place of a number of a row."""
+    return group * dims.rows + row + (2 if group >= 9 else 0)
+
+
+@njit(error_model="numpy", forceinline=True)
+def number(group, row, lane, out, dims):
+    """Return a number of a row in one lane."""
+    return out[place(group, row, dims) * WIDTH + lane]
+
+
+@njit(error_model="numpy", forceinline=True)
+def strike(t, y, friction):
+    """Apply impulses, corrections and resets, and store the modes."""
+    if LOOPED:
+        graph, weights = friction.network
+        friction.functions.strike(t, y, y, friction.out, graph, weights)
+    else:
+        friction.functions.strike(t, y, y, friction.out)
+    for group in range(K + friction.dims.felt, K + friction.dims.felt + 3):
+        for row in range(friction.dims.rows):
+            store(friction.out, place(group, row, friction.dims), broadcast(0.0, WIDTH))
+
+
+@njit(error_model="numpy")
+def solved(matrix, right, chosen, size):
+    """Solve the equations of the chosen rows in place of `right`; return False if they depend on each other."""
+    for a in range(size):
+        if not chosen[a]:
+            continue
+        pivot, scale = matrix[a, a], 0.0
+        for b in range(size):
+            if chosen[b]:
+                scale = max(scale, abs(matrix[a, b]))
+        if not abs(pivot) > NONE * scale:
+            return False
+        for r in range(size):
+            if chosen[r] and r != a:
+                factor = matrix[r, a] / pivot
+                for c in range(size):
+                    if chosen[c]:
+                        matrix[r, c] = matrix[r, c] - factor * matrix[a, c]
+                matrix[r, a] = 0.0
+                right[r] = right[r] - factor * right[a]
+    for a in range(size):
+        if chosen[a]:
+            right[a] = right[a] / matrix[a, a]
+    return True
+
+
+@njit(error_model="numpy")
+def hold(modes, chosen, x, lane, first, size, out, dims):
+    """Compute x of all rows of a node in some modes, the chosen ones held; return False if these depend on each other."""
+    matrix = np.empty((size, size))
+    for a in range(size):
+        x[a] = 0.0 if chosen[a] or number(LAW, first + a, lane, out, dims) != OF_SIGN else modes[a]
+    right = np.empty(size)
+    for a in range(size):
+        right[a] = number(RATE, first + a, lane, out, dims)
+        for b in range(size):
+            matrix[a, b] = number(K + b, first + a, lane, out, dims)
+            right[a] -= matrix[a, b] * x[b]
+    good = solved(matrix, right, chosen, size)
+    for a in range(size):
+        if chosen[a]:
+            x[a] = right[a]
+    return good
+
+
+@njit(error_model="numpy")
+def positive_minors(chosen, lane, first, size, out, dims):
+    """Return True if K of the chosen rows is a P-matrix; rows that do not feel themselves are left out."""
+    members = 0
+    for a in range(size):
+        if chosen[a] and number(K + a, first + a, lane, out, dims) != 0.0:
+            members |= 1 << a
+    for subset in range(1, 1 << size):
+        if subset & ~members:
+            continue
+        matrix, sign = np.empty((size, size)), 1.0
+        for a in range(size):
+            for b in range(size):
+                matrix[a, b] = number(K + b, first + a, lane, out, dims)
+        for a in range(size):
+            if (subset >> a) & 1:
+                sign = sign if matrix[a, a] > 0.0 else -1.0
+                for r in range(a + 1, size):
+                    if (subset >> r) & 1:
+                        factor = matrix[r, a] / matrix[a, a]
+                        for c in range(size):
+                            matrix[r, c] = matrix[r, c] - factor * matrix[a, c]
+        if sign < 0.0:
+            return False
+    return True
+
+
+@njit(error_model="numpy")
+def agrees(modes, chosen, decided, x, slack, lane, first, size, out, dims):
+    """Return True if the held rows can be held and the others leave their surfaces."""
+    for a in range(size):
+        if not decided[a]:
+            continue
+        row = first + a
+        stop, ratio = number(LAW, row, lane, out, dims) == OF_STOP, number(RATIO, row, lane, out, dims)
+        if chosen[a]:
+            good = x[a] >= -slack if stop else abs(x[a]) <= ratio + slack * ratio
+        else:
+            rate, scale = number(RATE, row, lane, out, dims), abs(number(RATE, row, lane, out, dims))
+            for b in range(size):
+                term = number(K + b, row, lane, out, dims) * x[b]
+                rate, scale = rate - term, max(scale, abs(term))
+            # a row leaves to the side of its mode; an open stop has a speed that falls
+            good = (-rate if stop else modes[a] * rate) > -slack * scale
+        if not good:
+            return False
+    return True
+
+
+@njit(error_model="numpy")
+def decide(notes, lane, first, size, friction):
+    """Store the modes of the rows of a node after an event; return False if the laws determine none."""
+    out, dims = friction.out, friction.dims
+    modes, best, x = np.empty(size), np.empty(size), np.empty(size)
+    chosen, decided = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
+    count, drops = 1, False
+    for a in range(size):
+        decided[a] = notes[first + a, ROLE] == OPEN
+        modes[a] = number(MODE, first + a, lane, out, dims)
+        if notes[first + a, ROLE] == RELEASED:
+            modes[a] = 1.0 if number(LAW, first + a, lane, out, dims) == OF_STOP or notes[first + a, X] > 0.0 else -1.0
+        best[a] = modes[a]
+        if decided[a]:
+            count *= 3
+            drops = drops or (
+                number(LAW, first + a, lane, out, dims) == OF_SIGN and number(RATIO, first + a, lane, out, dims) > 1.0
+            )
+    found, most, fewest, least = 0, -1, 0, 0.0
+    for slack in (0.0, 1e-9):
+        if found > 0:
+            break
+        for code in range(count):
+            rest, held, changes, possible = code, 0, 0, True
+            for a in range(size):
+                chosen[a] = False
+                if decided[a]:
+                    digit, rest = rest % 3, rest // 3
+                    chosen[a] = digit == 0
+                    modes[a] = 0.0 if digit == 0 else 1.0 if digit == 1 else -1.0
+                    held += int(digit == 0)
+                    changes += int(modes[a] != notes[first + a, BEFORE])
+                    possible = possible and not (digit == 2 and number(LAW, first + a, lane, out, dims) == OF_STOP)
+            if not possible or not hold(modes, chosen, x, lane, first, size, out, dims):
+                continue
+            if not agrees(modes, chosen, decided, x, slack, lane, first, size, out, dims):
+                continue
+            largest = 0.0
+            for a in range(size):
+                largest = max(largest, abs(x[a]) if decided[a] else 0.0)
+            found += 1
+            better = held > most or (held == most and changes < fewest)
+            if better or (held == most and changes == fewest and largest < least):
+                most, fewest, least = held, changes, largest
+                for a in range(size):
+                    best[a] = modes[a]
+        if found > 1 and slack > 0.0:
+            found = 1  # on the border of two sets, which are the same motion
+    for a in range(size):
+        put(out, place(MODE, first + a, dims), lane, best[a])
+    if drops:
+        return found > 0 and positive_minors(decided, lane, first, size, out, dims)
+    return found == 1
+
+
+@njit(error_model="numpy")
+def begin_event(notes, lane, first, size, friction):
+    """Note what an event means for the rows of a node, and set the impulses of stops; 2 if ambiguous, 1 if speeds jump."""
+    out, dims, felt = friction.out, friction.dims, friction.dims.felt
+    modes, x, chosen = np.empty(size), np.empty(size), np.zeros(size, np.bool_)
+    for a in range(size):
+        modes[a] = number(MODE, first + a, lane, out, dims)
+        chosen[a] = modes[a] == 0.0
+    hold(modes, chosen, x, lane, first, size, out, dims)
+    jumps = 0
+    for a in range(size):
+        row = first + a
+        law, shut = number(LAW, row, lane, out, dims), number(GAP, row, lane, out, dims) <= 0.0
+        notes[row, BEFORE], notes[row, SPEED_BEFORE], notes[row, X] = (
+            modes[a],
+            number(SPEED, row, lane, out, dims),
+            x[a],
+        )
+        if chosen[a]:
+            notes[row, ROLE] = RELEASED if shut else OPEN
+        else:
+            notes[row, ROLE] = OPEN if shut and law == OF_SIGN else KNOWN
+        if shut and law == OF_RESET:
+            put(out, place(K + felt + 2, row, dims), lane, 1.0)
+            jumps = max(jumps, 1)
+        if shut and law == OF_STOP and not chosen[a]:
+            speed, stiff = notes[row, SPEED_BEFORE], number(K + a, row, lane, out, dims)
+            put(out, place(K + felt + 1, row, dims), lane, -number(LEVEL, row, lane, out, dims) / stiff)
+            e, jumps = number(RATIO, row, lane, out, dims), max(jumps, 1)
+            inward = number(RATE, row, lane, out, dims)
+            for b in range(size):
+                inward -= number(K + b, row, lane, out, dims) * x[b]
+                other = b != a and number(LAW, first + b, lane, out, dims) == OF_STOP
+                hit = number(GAP, first + b, lane, out, dims) <= 0.0 or modes[b] == 0.0
+                if other and hit and number(K + b, row, lane, out, dims) != 0.0:
+                    jumps = 2
+            if ends_soon(e * speed, inward, e, friction.control[ATOL]):
+                e = 0.0
+            if e == 0.0:
+                notes[row, ROLE] = OPEN
+            if speed > 0.0:
+                put(out, place(K + felt, row, dims), lane, (1.0 + e) * speed / stiff)
+    return jumps
+
+
+@njit(error_model="numpy", forceinline=True)
+def ends_soon(speed, inward, e, atol):
+    """Return True if a stop rebounds so slowly that it may close: what is lost is below the tolerance."""
+    if not (inward > 0.0 and e < 1.0):
+        return False
+    return speed < math.sqrt(atol) and speed * speed * speed < atol * inward * inward * (1.0 - e)
+
+
+@njit(error_model="numpy")
+def after_jump(notes, lane, first, size, friction):
+    """Find the modes of rows whose speeds have jumped: they leave their surfaces."""
+    out, dims = friction.out, friction.dims
+    for a in range(size):
+        row = first + a
+        law, mode = number(LAW, row, lane, out, dims), number(MODE, row, lane, out, dims)
+        speed = number(SPEED, row, lane, out, dims)
+        if law == OF_SIGN and notes[row, ROLE] == KNOWN:
+            put(out, place(MODE, row, dims), lane, -mode if mode * speed < 0.0 else mode)
+        elif law == OF_SIGN:
+            if abs(speed - notes[row, SPEED_BEFORE]) > NONE * max(abs(speed), 1e-3):
+                notes[row, ROLE] = KNOWN
+                put(out, place(MODE, row, dims), lane, 1.0 if speed > 0.0 else -1.0)
+        elif law == OF_STOP and mode == 0.0 and speed - notes[row, SPEED_BEFORE] < -NONE * max(abs(speed), 1e-3):
+            notes[row, ROLE] = KNOWN
+            put(out, place(MODE, row, dims), lane, 1.0)
+
+
+@njit(error_model="numpy")
+def settle(lane, first, size, friction):
+    """Set the impulses that put the held rows of a node onto their surfaces; return True if there are any."""
+    out, dims, felt = friction.out, friction.dims, friction.dims.felt
+    matrix, right, chosen = np.empty((size, size)), np.empty(size), np.zeros(size, np.bool_)
+    for a in range(size):
+        chosen[a] = number(MODE, first + a, lane, out, dims) == 0.0
+    for _ in range(size):
+        for a in range(size):
+            right[a] = number(SPEED, first + a, lane, out, dims)
+            for b in range(size):
+                matrix[a, b] = number(K + b, first + a, lane, out, dims)
+        if solved(matrix, right, chosen, size):
+            break
+        for a in range(size - 1, -1, -1):  # rows that depend on each other: leave the last one out
+            if chosen[a]:
+                chosen[a] = False
+                break
+    found = False
+    for a in range(size):
+        if chosen[a]:
+            row, found = first + a, True
+            put(out, place(K + felt, row, dims), lane, right[a])
+            if number(LAW, row, lane, out, dims) == OF_STOP:
+                stiff = number(K + a, row, lane, out, dims)
+                put(out, place(K + felt + 1, row, dims), lane, -number(LEVEL, row, lane, out, dims) / stiff)
+    return found
+
+
+@njit(error_model="numpy", forceinline=True)
+def size_of(first, lane, out, dims):
+    """Return the number of rows of a node from its first row."""
+    size = 1
+    while first + size < dims.rows and number(NUMBER, first + size, lane, out, dims) != 0.0:
+        size += 1
+    return size
+
+
+@njit(error_model="numpy")
+def change_modes(moved, t, y, friction):
+    """Let the rows of every node with a closed gap rebound, reset, be held, slip or open; keep held rows on surfaces."""
+    if not any_lane(moved):
+        return
+    out, dims = friction.out, friction.dims
+    shut = moved & (smallest_gap(t, y, y, friction) <= 0.0)
+    for group in range(K + dims.felt, K + dims.felt + 3):
+        for row in range(dims.rows):
+            store(out, place(group, row, dims), broadcast(0.0, WIDTH))
+    notes, active, events = np.zeros((WIDTH, dims.rows, 4)), lane_bits(moved), lane_bits(shut)
+    for part in range(2):
+        if part > 0 and events == 0:
+            break
+        struck = False
+        for lane in range(WIDTH):
+            if not (((events if part else active) >> lane) & 1):
+                continue
+            first = 0
+            while first < dims.rows:
+                size, closed = size_of(first, lane, out, dims), False
+                for row in range(first, first + size):
+                    if part == 0:
+                        notes[lane, row, BEFORE] = number(MODE, row, lane, out, dims)
+                        closed = closed or number(GAP, row, lane, out, dims) <= 0.0
+                    else:
+                        closed = closed or notes[lane, row, ROLE] != UNTOUCHED
+                if part == 0 and closed:
+                    outcome = begin_event(notes[lane], lane, first, size, friction)
+                    struck = struck or outcome > 0
+                    if outcome == 2:
+                        put(friction.clock, RUSH, lane, math.inf)
+                elif part == 0:
+                    struck = settle(lane, first, size, friction) or struck
+                elif closed:
+                    after_jump(notes[lane], lane, first, size, friction)
+                    if not decide(notes[lane], lane, first, size, friction):
+                        put(friction.clock, RUSH, lane, math.inf)
+                    settle(lane, first, size, friction)
+                first += size
+        if struck or part == 1:
+            strike(t, y, friction)
+        if part == 0 and struck and events != 0:
+            push(t, y, y, friction)

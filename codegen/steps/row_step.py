@@ -1,0 +1,339 @@
+"""Write the functions of rows (models/mechanics/rows.py), for the events of codegen/driver/rows.py.
+
+`pushes(t, y, p, out)` stores six groups of ROWS numbers, one number for each row, node after node:
+
+    0  level            2  mode                          4  rate of the speed if all x were 0
+    1  gap              3  speed, held at zero           5  ratio: static over kinetic friction, or restitution
+
+The driver stores three more groups behind these six, and two numbers on jumps and kinks in time follow (contact_step.py).
+Behind them are groups of numbers that decide on modes: the law of the row, its number among the rows of its node, and
+its entries of K in the columns of these rows.  `strike(t, y, p, out)` adds impulses to the states of the nodes, corrects gaps,
+resets states, and stores the modes of group 2.  It reads three groups that the driver stores behind those of K: the
+impulse of each row, the correction of its gap, and 1 where a guard fires.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import islice
+
+import sympy as sp
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import Edge, Node
+from synchain.models.mechanics.rows import Law, Row, forces
+
+from ..program.expressions import Expression, Load, Name, Number, plus
+from ..program.lowering import lower
+from ..program.passes import Names, real, share
+from ..program.statements import Assign, Function, Role, Statement, accumulate, let, store
+from .blocks import assigned
+from .contact_step import SIDES, jump_sides, parameter_loads, time_gaps
+from .places import Joint, Span, StateLayout, link_ends, named
+from .safe_names import NAMES
+from .step import lane
+
+LAWS = {Law.SIGN: 0, Law.STOP: 1, Law.RESET: 2}
+"""The numbers of laws in the driver."""
+
+LEVEL, GAP, MODE, SPEED, RATE, RATIO = range(6)
+"""The groups of numbers in front of the looks."""
+
+
+def most_rows(equations: Equations) -> int:
+    """Return the largest number of rows of a node."""
+    return max(len(node.rows) for node in equations.nodes)
+
+
+def row_count(equations: Equations) -> int:
+    """Return the number of rows of all nodes."""
+    return sum(len(equations.nodes[kind].rows) for kind in equations.kind_of)
+
+
+def row_functions(equations: Equations, names: Names, looped: bool) -> list[Function]:
+    """Return the functions `pushes` and `strike`, written out or `looped` over nodes and links."""
+    network = ("graph", "weights") if looped else ()
+    written = _Looped(equations, names) if looped else _WrittenOut(equations, names)
+    about = "For each row: level, gap, mode, speed, its rate and its ratio; law, number in its node, K."
+    strike = "Add impulses to the states, correct gaps, reset states where guards fire, and store the modes."
+    arguments = ("t", "y", "p", "out", *network)
+    return [
+        Function("pushes", arguments, about, tuple(written.pushes()), role=Role.ENTRY),
+        Function("strike", arguments, strike, tuple(written.strike()), role=Role.ENTRY),
+    ]
+
+
+def _full(rows: Sequence[Row], row: Row) -> list[sp.Expr]:
+    """Return K of a row with an entry for each row of the node, 0 for guards."""
+    entries = iter(row.stiffness)
+    return [sp.S.Zero if each.law is Law.RESET else next(entries) for each in rows]
+
+
+def _struck(
+    node_rows: Sequence[Row], state: Sequence[sp.Symbol], numbers: Sequence[Sequence[sp.Symbol]]
+) -> list[sp.Expr]:
+    """Return the continuous states after an event, from the impulse, correction and firing of each row."""
+    after = []
+    for c, s in enumerate(state):
+        moves = (row.push[c] * z + row.lift[c] * g for row, (z, g, _) in zip(node_rows, numbers, strict=True))
+        e = s + sp.Add(*moves)
+        for row, (_, _, fires) in zip(node_rows, numbers, strict=True):
+            value = dict(row.sets).get(s)
+            e = e if value is None else sp.Piecewise((value, fires > sp.Rational(1, 2)), (e, True))
+        after.append(e)
+    return after
+
+
+class _Writer:
+    """The places of the numbers of rows in `out`."""
+
+    def __init__(self, equations: Equations, names: Names) -> None:
+        self.equations, self.names = equations, names
+        self.rows, self.most = row_count(equations), most_rows(equations)
+        self.supply = names.fresh("row_")
+
+    def place(self, group: int, row: Expression | int) -> Expression:
+        """Return the place of a number of one of the first six groups."""
+        return plus(Number(group * self.rows), row if isinstance(row, Expression) else Number(row))
+
+    def behind(self, group: int, row: Expression | int) -> Expression:
+        """Return the place of a number behind those on jumps in time: law, first row, K, impulse, correction, firing."""
+        return self.place(SIDES + group, plus(row if isinstance(row, Expression) else Number(row), Number(2)))
+
+
+class _WrittenOut(_Writer):
+    def pushes(self) -> list[Statement]:
+        equations = self.equations
+        columns: list[sp.Expr] = []
+        places: list[Expression] = []
+        for _, first, rows in self.parts():
+            for a, row in enumerate(rows):
+                mode = sp.S.One if row.law is Law.RESET else row.mode
+                columns += (row.level, row.gap, mode, row.speed, row.rate, row.ratio)
+                places += [self.place(group, first + a) for group in range(6)]
+                columns += (sp.Integer(LAWS[row.law]), sp.Integer(a), *_full(rows, row))
+                places += [self.behind(group, first + a) for group in range(2 + len(rows))]
+        zeros = [e.xreplace(equations.at_node(i)) for i in range(equations.n) for e in time_gaps(equations.node_at(i))]
+        zeros += [
+            e.xreplace(equations.at_link(link, edge)) for link, edge in equations.linked() for e in time_gaps(edge)
+        ]
+        sides = jump_sides(zeros)
+        places += [Number(SIDES * self.rows + k) for k in range(len(sides))]
+        body = share([*columns, *sides], self.names.fresh("z"))
+        return [
+            *self.loads(body.symbols, "p"),
+            *parameter_loads(equations, body.symbols),
+            *assigned(body),
+            *(store("out", k, lane(lower(e))) for k, e in zip(places, body.results, strict=True)),
+        ]
+
+    def strike(self) -> list[Statement]:
+        equations, columns, places, loads, modes = self.equations, [], [], [], []
+        for i, first, rows in self.parts():
+            symbols = equations.symbols(i)
+            numbers = []
+            for a in range(len(rows)):
+                triple = tuple(islice(self.supply, 3))
+                numbers.append(triple)
+                loads += [
+                    let(s.name, Load("out", self.behind(2 + self.most + k, first + a))) for k, s in enumerate(triple)
+                ]
+            size = len(equations.node_at(i).continuous)
+            after = _struck(rows, symbols[:size], numbers)
+            columns += [e for e, s in zip(after, symbols, strict=False) if e != s]
+            places += [k for k, e, s in zip(equations.places[i], after, symbols, strict=False) if e != s]
+            held = [a for a, row in enumerate(rows) if row.law is not Law.RESET]
+            modes += [
+                store("y", k, Load("out", self.place(MODE, first + a)))
+                for k, a in zip(equations.places[i][size:], held, strict=True)
+            ]
+        body = share(columns, self.names.fresh("z"))
+        stores = [store("y", k, lane(lower(e))) for k, e in zip(places, body.results, strict=True)]
+        return [
+            *self.loads(body.symbols, "y"),
+            *parameter_loads(equations, body.symbols),
+            *loads,
+            *assigned(body),
+            *stores,
+            *modes,
+        ]
+
+    def parts(self) -> list[tuple[int, int, tuple[Row, ...]]]:
+        """Return each node with its first row and its rows."""
+        parts, first = [], 0
+        for i in range(self.equations.n):
+            rows = self.equations.rows_at(i)
+            parts.append((i, first, rows))
+            first += len(rows)
+        return parts
+
+    def loads(self, used: set[sp.Symbol], of_modes: str) -> list[Statement]:
+        """Load states from `y`; modes, which last for a whole step, from `of_modes`."""
+        equations = self.equations
+        modes = {k for i, at in enumerate(equations.places) for k in at[len(equations.node_at(i).continuous) :]}
+        named_states = enumerate(equations.state)
+        return [let(s, Load(of_modes if k in modes else "y", Number(k))) for k, s in named_states if real(s) in used]
+
+
+class _Looped(_Writer):
+    """Loops over the nodes of each kind, over the links of each template, and over the nodes again for the gaps."""
+
+    def __init__(self, equations: Equations, names: Names) -> None:
+        super().__init__(equations, names)
+        self.layout = StateLayout(equations)
+        counts = [equations.kind_of.count(k) * len(node.rows) for k, node in enumerate(equations.nodes)]
+        starts = [sum(equations.kind_of.count(j) for j in range(k)) for k in range(len(counts))]
+        self.offsets = [sum(counts[:k]) - starts[k] * len(node.rows) for k, node in enumerate(equations.nodes)]
+
+    def row(self, kind: int, a: int, index: str = "i") -> Expression:
+        """Return the number of row `a` of a node in a loop."""
+        return plus(len(self.equations.nodes[kind].rows) * Name(index), Number(self.offsets[kind] + a))
+
+    def pushes(self) -> list[Statement]:
+        equations, statements = self.equations, []
+        differing = set(map(real, (*equations.varied, *equations.numbered)))
+        parts: tuple[Node | Edge, ...] = (*equations.nodes, *equations.edges)
+        sides = share(
+            jump_sides([e for part in parts for e in time_gaps(part) if not e.free_symbols & differing]),
+            self.names.fresh("side"),
+        )
+        used = set(sides.symbols)
+        tail = [store("out", SIDES * self.rows + k, lane(lower(e))) for k, e in enumerate(sides.results)]
+        statements += [*assigned(sides), *tail]
+        loops = []
+        for kind in self.layout.kinds:
+            loops += self.of_node(kind.node, kind.number, used)
+        for joint in self.layout.joints:
+            loops += self.of_link(joint, used)
+        for kind in self.layout.kinds:
+            loops += self.gaps(kind.node, kind.number)
+        head = [Assign(NAMES, Name("graph"), whole=True)]
+        return [*head, *parameter_loads(equations, used), *statements, *loops]
+
+    def of_node(self, node: Node, number: int, used: set[sp.Symbol]) -> list[Statement]:
+        if not node.rows:
+            return []
+        columns, places = [], []
+        for a, row in enumerate(node.rows):
+            columns += [row.level, sp.S.One if row.law is Law.RESET else row.mode, row.speed, row.rate, row.ratio]
+            places += [self.place(group, self.row(number, a)) for group in (LEVEL, MODE, SPEED, RATE, RATIO)]
+            columns += [sp.Integer(LAWS[row.law]), sp.Integer(a), *_full(node.rows, row)]
+            places += [self.behind(group, self.row(number, a)) for group in range(2 + len(node.rows))]
+        body = share(columns, self.names.fresh("z"))
+        used |= body.symbols
+        loop: list[Statement] = [*self.states(node, body.symbols, "p"), *self.layout.own(body.symbols), *assigned(body)]
+        loop += [store("out", k, lane(lower(e))) for k, e in zip(places, body.results, strict=True)]
+        return [self.span_of(number).over(loop)]
+
+    def of_link(self, joint: Joint, used: set[sp.Symbol]) -> list[Statement]:
+        """Add what a link does to the rates of the speeds of its target."""
+        edge, node = joint.edge, joint.target
+        if not node.rows:
+            return []
+        number, size, swap = self.equations.nodes.index(node), len(node.continuous), named(joint)
+        here = dict(zip(node.state, edge.here, strict=True))
+        off = dict.fromkeys(edge.here[size:], sp.S.One)
+        plain = [e.xreplace(off) for e in edge.rhs[:size]]
+        added, places = [], []
+        for a, row in enumerate(node.rows):
+            gained = sp.Add(*(g.xreplace(here) * f for g, f in zip(row.gradient, plain, strict=True)))
+            if gained != 0:
+                added.append(gained)
+                places.append(self.place(RATE, self.row(number, a)))
+        if not added:
+            return []
+        symbols = {s for e in added for s in e.free_symbols}
+        used |= symbols
+        loop = [*link_ends(edge, edge.weight.name), *self.layout.of_link(edge, symbols)]
+        ends = (("i", node, edge.here), ("j", joint.source, edge.there))
+        for index, end, states in ends:
+            modes = len(end.continuous)
+            loop += [
+                let(swap[s].name, Load("y" if k < modes else "p", self.layout.place(k, index)))
+                for k, s in enumerate(states)
+                if s in symbols
+            ]
+        body = share([e.xreplace(swap) for e in added], self.names.fresh("z"))
+        loop += assigned(body)
+        loop += [accumulate("out", k, lower(e)) for k, e in zip(places, body.results, strict=True)]
+        return [joint.span.over(loop)]
+
+    def gaps(self, node: Node, number: int) -> list[Statement]:
+        """Compute gaps from the stored numbers, after the links have added theirs."""
+        if not node.rows:
+            return []
+        stored: dict[sp.Symbol, Expression] = {}
+
+        def number_of(place: Expression) -> sp.Symbol:
+            symbol = next(self.supply)
+            stored[symbol] = Load("out", place)
+            return symbol
+
+        held = [a for a, row in enumerate(node.rows) if row.law is not Law.RESET]
+        modes = [number_of(self.place(MODE, self.row(number, a))) for a in held]
+        rates = [number_of(self.place(RATE, self.row(number, a))) for a in held]
+        stiffness = [
+            tuple(
+                e if e.is_number else number_of(self.behind(2 + b, self.row(number, a)))
+                for b, e in zip(held, node.rows[a].stiffness, strict=True)
+            )
+            for a in held
+        ]
+        x = dict(zip(held, forces([node.rows[a].law for a in held], modes, stiffness, rates), strict=True))
+        columns = []
+        for a, row in enumerate(node.rows):
+            level = number_of(self.place(LEVEL, self.row(number, a)))
+            ratio = number_of(self.place(RATIO, self.row(number, a)))
+            zeros = (sp.S.Zero,)
+            mode = modes[held.index(a)] if a in x else row.mode
+            columns.append(
+                Row(
+                    row.law, mode, level, level, level, zeros, zeros, zeros, ratio, x.get(a, sp.S.Zero), zeros, zeros
+                ).gap
+            )
+        body = share(columns, self.names.fresh("z"))
+        loop: list[Statement] = [let(s.name, e) for s, e in stored.items() if s in body.symbols]
+        loop += assigned(body)
+        loop += [store("out", self.place(GAP, self.row(number, a)), lower(e)) for a, e in enumerate(body.results)]
+        return [self.span_of(number).over(loop)]
+
+    def strike(self) -> list[Statement]:
+        loops, used = list[Statement](), set[sp.Symbol]()
+        for kind in self.layout.kinds:
+            node, number = kind.node, kind.number
+            if not node.rows:
+                continue
+            numbers = [tuple(islice(self.supply, 3)) for _ in node.rows]
+            after = _struck(node.rows, node.continuous, numbers)
+            changed = [c for c, e in enumerate(after) if e != node.state[c]]
+            body = share([after[c] for c in changed], self.names.fresh("z"))
+            used |= body.symbols
+            loop = [*self.states(node, body.symbols, "y"), *self.layout.own(body.symbols)]
+            loop += [
+                let(s.name, Load("out", self.behind(2 + self.most + k, self.row(number, a))))
+                for a, triple in enumerate(numbers)
+                for k, s in enumerate(triple)
+                if s in body.symbols
+            ]
+            loop += assigned(body)
+            loop += [
+                store("y", self.layout.place(c), lane(lower(e))) for c, e in zip(changed, body.results, strict=True)
+            ]
+            held = [a for a, row in enumerate(node.rows) if row.law is not Law.RESET]
+            loop += [
+                store("y", self.layout.place(c), Load("out", self.place(MODE, self.row(number, a))))
+                for c, a in enumerate(held, start=len(node.continuous))
+            ]
+            loops.append(kind.span.over(loop))
+        return [Assign(NAMES, Name("graph"), whole=True), *parameter_loads(self.equations, used), *loops]
+
+    def span_of(self, number: int) -> Span:
+        return self.layout.kinds[number].span
+
+    def states(self, node: Node, used: set[sp.Symbol], of_modes: str) -> list[Statement]:
+        size = len(node.continuous)
+        return [
+            let(s.name, Load("y" if c < size else of_modes, self.layout.place(c)))
+            for c, s in enumerate(node.state)
+            if s in used
+        ]

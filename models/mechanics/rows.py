@@ -1,0 +1,290 @@
+"""Rows: several surfaces of one node at which its rates jump, and on which its motion can be held.
+
+A row has a speed h(state, t) that is held at zero: the sliding velocity of a contact, a level whose sign stands in the
+rates, or the speed with which a stop is approached.  The rates of a node with rows are linear in one number x of each
+row, dz/dt = f(z, t) + sum G x, and dh/dt = b - K x with b = grad h f + dh/dt and K = -grad h G.  Off the surface x is
+the sign of h, and 0 at an open stop.  On the surface x is the number that makes dh/dt = 0, as long as |x| <= r, where r
+is static over kinetic friction; a closed stop presses, x >= 0.  With D = 1 in held rows and D = 0 in the others, all x
+of all modes solve one linear system D (K x - b) + (1 - D) (x - s) = 0, which is solved in symbols by Cramer's rule.
+
+Sources: Filippov, Differential Equations with Discontinuous Righthand Sides (Kluwer, 1988), chapter 2; Leine &
+Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer, 2004), chapter 5; Acary & Brogliato,
+Numerical Methods for Nonsmooth Dynamical Systems (Springer, 2008).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+
+import sympy as sp
+
+from ..inputs.words import Word
+from .calculus import derivative
+from .contact import SLIDING, SLIP, beyond_rest, coefficient_at_rest, in_slip
+
+MOST_ROWS = 3
+"""Most rows of a node that can be held (a choice): x is solved in symbols by minors, which are short for three rows."""
+
+TIME = sp.Symbol("t", real=True)
+
+NO_MODE = sp.Symbol("no mode", real=True)
+"""In place of the mode of a row that is never held."""
+
+Column = tuple[sp.Expr, ...]
+
+
+class Law(Word):
+    """What happens where the level of a row is zero."""
+
+    SIGN = "sign"
+    """The sign of the level stands in the rates; motion crosses, or is held."""
+    STOP = "stop"
+    """A gap closes: motion rebounds, or is held."""
+    RESET = "reset"
+    """A guard passes zero upwards and states jump."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """A row as a model defines it, in the symbols of the node."""
+
+    law: Law
+    level: sp.Expr  # SIGN: h; STOP: the gap, positive while open; RESET: the guard
+    push: Column = ()  # what one unit of x adds to the rate of each continuous state, in terms of the mode `SLIP`
+    ratio: sp.Expr = sp.S.One  # SIGN: static over kinetic friction; STOP: restitution
+    sets: tuple[tuple[sp.Symbol, sp.Expr], ...] = ()  # RESET: the values just after
+    name: str = ""  # ending of the name of the mode if a node has several
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row of a node, or of a network under the forces of its links.  Columns have an entry for each continuous state."""
+
+    law: Law
+    mode: sp.Symbol  # SIGN: the sign of the level, 0 while held; STOP: 1 open, 0 closed; RESET: `NO_MODE`
+    level: sp.Expr
+    speed: sp.Expr  # held at zero: the level, or of a stop the rate at which the gap closes
+    rate: sp.Expr  # b, the rate of the speed if all x were 0
+    gradient: Column  # of the speed
+    push: Column  # what one unit of x adds to the rates
+    stiffness: Column  # K, an entry for each row of the node
+    ratio: sp.Expr
+    x: sp.Expr  # the solution of the masked system
+    lift: Column  # what one unit of a stop's correction adds to the states, to close the gap again; zeros elsewhere
+    answer: Column  # derivative of x by the rates without rows, for the forces of links
+    sets: tuple[tuple[sp.Symbol, sp.Expr], ...] = ()
+
+    @property
+    def gap(self) -> sp.Expr:
+        """An expression that is positive while the mode lasts: the smallest of `gaps`."""
+        return sp.Min(*self.gaps)
+
+    @property
+    def gaps(self) -> Column:
+        """Expressions that are positive while the mode lasts; the second of two can pass zero only in held rows."""
+        if self.law is Law.RESET:
+            return (-self.level,)
+        off, held = self.mode * self.level, 1 - self.mode**2
+        if self.law is Law.STOP:
+            return (off + held * self.x,)
+        return off + held * (self.ratio - self.x), off + held * (self.ratio + self.x)
+
+    def gained(self, force: Sequence[sp.Expr]) -> Column:
+        """Return what further rates of the continuous states add to the gaps."""
+        x = (1 - self.mode**2) * sp.Add(*(a * b for a, b in zip(self.answer, force, strict=True)))
+        return {Law.RESET: (sp.S.Zero,), Law.STOP: (x,), Law.SIGN: (-x, x)}[self.law]
+
+    @property
+    def expressions(self) -> Column:
+        """All expressions."""
+        columns = (*self.gradient, *self.push, *self.stiffness, *self.lift, *self.answer, *(e for _, e in self.sets))
+        return self.level, self.speed, self.rate, self.ratio, self.x, *columns
+
+    def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Row:
+        """Return the row with every symbol and expression changed."""
+        changed = {}
+        for field in fields(Row):
+            value = getattr(self, field.name)
+            if isinstance(value, sp.Expr):
+                changed[field.name] = change(value)
+            elif field.name == "sets":
+                changed[field.name] = tuple((change(s), change(e)) for s, e in value)
+            elif isinstance(value, tuple):
+                changed[field.name] = tuple(map(change, value))
+        return replace(self, **changed)
+
+    def under(self, force: Sequence[sp.Expr]) -> Row:
+        """Return the row with further rates of the continuous states."""
+        rate = self.rate + sp.Add(*(a * b for a, b in zip(self.gradient, force, strict=True)))
+        return replace(self, rate=rate, x=self.x + sp.Add(*(a * b for a, b in zip(self.answer, force, strict=True))))
+
+
+def with_rows(
+    state: Sequence[sp.Symbol],
+    rates: Sequence[sp.Expr],
+    surfaces: Sequence[Surface],
+    speeds: Mapping[sp.Symbol, sp.Symbol],
+) -> tuple[tuple[sp.Symbol, ...], tuple[sp.Expr, ...], tuple[Row, ...]]:
+    """Return the states, rates and rows of a node from its continuous states, and their rates with all x = 0.
+
+    speeds: maps each velocity to its coordinate.
+    """
+    _check_surfaces(surfaces)
+    held = [surface for surface in surfaces if surface.law is not Law.RESET]
+    modes = _modes(held)
+    inside = [[e.xreplace({SLIP: mode}) for e in surface.push] for surface, mode in zip(held, modes, strict=True)]
+    along = list(map(sp.sympify, rates))
+
+    def slope(e: sp.Expr) -> Column:
+        return tuple(derivative(e, s) for s in state)
+
+    def total(e: sp.Expr) -> sp.Expr:
+        return derivative(e, TIME) + sp.Add(*(a * f for a, f in zip(slope(e), along, strict=True)))
+
+    levels = [surface.level if surface.law is Law.SIGN else -total(surface.level) for surface in held]
+    gradients = list(map(slope, levels))
+    biases = list(map(total, levels))
+    stiffness = [
+        tuple(sp.factor_terms(-sp.Add(*(a * g for a, g in zip(gradient, push, strict=True)))) for push in inside)
+        for gradient in gradients
+    ]
+    for surface, level, row, k in zip(held, levels, stiffness, range(len(held)), strict=True):
+        if sp.simplify(row[k]) == 0:
+            raise ValueError(
+                f"{surface.law}: found the level {surface.level}, whose rate {'' if level == surface.level else 'of change '}"
+                "does not feel its own force; expected one that it changes"
+            )
+    laws = [surface.law for surface in held]
+    x = forces(laws, modes, stiffness, biases)
+    answers = [
+        tuple(
+            sp.Add(*(e * (1 - modes[b] ** 2) * gradients[b][c] for b, e in enumerate(row))) for c in range(len(state))
+        )
+        for row in _inverse(modes, stiffness)
+    ]
+    rows, places = [], dict(zip(state, range(len(state)), strict=True))
+    for surface in surfaces:
+        zeros = (sp.S.Zero,) * len(state)
+        if surface.law is Law.RESET:
+            none = (sp.S.Zero,) * len(held)
+            rows.append(
+                Row(surface.law, NO_MODE, surface.level, surface.level, sp.S.Zero, zeros, zeros, none, sp.S.One, sp.S.Zero,
+                    zeros, zeros, surface.sets)
+            )  # fmt: skip
+            continue
+        a, lift = held.index(surface), list(zeros)
+        for speed, coordinate in speeds.items() if surface.law is Law.STOP else ():
+            lift[places[coordinate]] = inside[a][places[speed]]
+        rows.append(
+            Row(surface.law, modes[a], surface.level, levels[a], biases[a], gradients[a], tuple(inside[a]), stiffness[a],
+                surface.ratio, x[a], tuple(lift), answers[a])
+        )  # fmt: skip
+    total_rates = [f + sp.Add(*(push[c] * x[a] for a, push in enumerate(inside))) for c, f in enumerate(along)]
+    return (*state, *modes), (*total_rates, *[sp.S.Zero] * len(modes)), tuple(rows)
+
+
+def forces(
+    laws: Sequence[Law], modes: Sequence[sp.Symbol], stiffness: Sequence[Column], rates: Sequence[sp.Expr]
+) -> list[sp.Expr]:
+    """Return x of each row that can be held: A x = D b + (1 - D) s with A = D K + (1 - D), and s = 0 at stops.
+
+    In rows that are not held A is the identity, so that x = s there to the last bit.
+    """
+    right = [
+        (1 - mode**2) * rate + (mode if law is Law.SIGN else sp.S.Zero)
+        for law, mode, rate in zip(laws, modes, rates, strict=True)
+    ]
+    return [sp.Add(*(e * c for e, c in zip(row, right, strict=True))) for row in _inverse(modes, stiffness)]
+
+
+def projection(rows: Sequence[Row], plain: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
+    """Return what rates that a link adds to a node become while rows are held: f + sum G dx(f)."""
+    held = [row for row in rows if row.law is not Law.RESET]
+    gained = [sp.Add(*(a * f for a, f in zip(row.answer, plain, strict=True))) for row in held]
+    return tuple(
+        f + sp.Add(*(row.push[c] * x for row, x in zip(held, gained, strict=True))) for c, f in enumerate(plain)
+    )
+
+
+def off_surfaces(rates: Sequence[sp.Expr], rows: Sequence[Row]) -> tuple[sp.Expr, ...]:
+    """Return the rates of a node off all surfaces, with the sign of each level, for printing."""
+    free = {row.mode: sp.S.One for row in rows}
+    signs = [row for row in rows if row.law is Law.SIGN]
+    smooth = (
+        e.xreplace(free) - sp.Add(*(row.push[c].xreplace(free) for row in signs))
+        for c, e in enumerate(rates[: len(rates) - len(free) + (NO_MODE in free)])
+    )
+    return tuple(
+        sp.expand(e)
+        + sp.Add(*(row.push[c].xreplace({row.mode: sp.sign(row.level)}) * sp.sign(row.level) for row in signs))
+        for c, e in enumerate(smooth)
+    )
+
+
+def friction_surface(
+    sliding: sp.Expr, pull: Column, law: sp.Expr, argument: sp.Symbol, static: sp.Expr | None
+) -> Surface:
+    """Return the row of a contact: `pull` is what one unit of the friction coefficient adds to the rates."""
+    moving = in_slip(law, argument)
+    slow = coefficient_at_rest(moving, argument)
+    if slow == 0:
+        raise ValueError(
+            f"set-valued contact: the law {law.xreplace({argument: SLIDING})} has no jump at w = 0, so nothing sticks; use contact 'atan'"
+        )
+    # the law in slip over its sign, as a function of |w| = mode w
+    size = beyond_rest(moving, argument).xreplace({SLIP: sp.S.One}).xreplace({argument: SLIP * sliding})
+    ratio = sp.S.One if static is None else sp.cancel(static / slow)
+    return Surface(Law.SIGN, sliding, tuple(e * size for e in pull), ratio)
+
+
+def _modes(held: Sequence[Surface]) -> list[sp.Symbol]:
+    """Return the symbols of the modes: slip or open, with an ending where there are several."""
+    stems = ["open" if surface.law is Law.STOP else "slip" for surface in held]
+    endings = [surface.name and f"_{surface.name}" for surface in held]
+    names = [stem if stems.count(stem) == 1 else f"{stem}{ending}" for stem, ending in zip(stems, endings, strict=True)]
+    unique = [
+        name if names.count(name) == 1 else f"{stem}{names[: k + 1].count(name)}"
+        for k, (name, stem) in enumerate(zip(names, stems, strict=True))
+    ]
+    return [sp.Symbol(name, real=True) for name in unique]
+
+
+def _check_surfaces(surfaces: Sequence[Surface]) -> None:
+    """Raise ValueError for rows that no motion determines."""
+    held = [surface for surface in surfaces if surface.law is not Law.RESET]
+    if len(held) > MOST_ROWS:
+        raise ValueError(
+            f"events: found {len(held)} contacts, stops and surfaces of a node; expected at most {MOST_ROWS}"
+        )
+    for k, one in enumerate(held):
+        for j, other in enumerate(held[:k]):
+            same = one.law is other.law and sp.simplify(one.level / other.level) if other.level != 0 else sp.S.Zero
+            if same is not False and getattr(same, "is_number", False) and same != 0:
+                raise ValueError(f"contacts {j + 1} and {k + 1} slide together; add their loads")
+
+
+def _inverse(modes: Sequence[sp.Symbol], stiffness: Sequence[Column]) -> list[list[sp.Expr]]:
+    """Return the inverse of A = D K + (1 - D) by minors, group by group of rows that feel each other."""
+    size = len(modes)
+    matrix = [
+        [(1 - modes[a] ** 2) * stiffness[a][b] + (modes[a] ** 2 if a == b else 0) for b in range(size)]
+        for a in range(size)
+    ]
+    inverse: list[list[sp.Expr]] = [[sp.S.Zero] * size for _ in range(size)]
+    left = set(range(size))
+    while left:
+        group, more = set[int](), {min(left)}
+        while more:
+            group |= more
+            more = {b for a in group for b in left if stiffness[a][b] != 0 or stiffness[b][a] != 0} - group
+        rows = sorted(group)
+        # minors of placeholders: the entries stay as they are, so that code computes each of them once
+        block = sp.Matrix(len(rows), len(rows), lambda k, j: sp.Dummy(f"a{k}{j}"))
+        values = {block[k, j]: matrix[a][b] for k, a in enumerate(rows) for j, b in enumerate(rows)}
+        minors, determinant = block.adjugate(), block.det(method="berkowitz").xreplace(values)
+        for k, a in enumerate(rows):
+            for j, b in enumerate(rows):
+                inverse[a][b] = minors[k, j].xreplace(values) / determinant
+        left -= group
+    return inverse
