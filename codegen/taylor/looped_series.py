@@ -315,7 +315,7 @@ def polynomial(name: str, degree: int, coefficient: Callable[[Expression], Expre
 
 def with_gaps(node: Node) -> list[sp.Expr]:
     """Return the rates of a node, followed by the gaps of each event and row."""
-    return [*node.rhs, *(gap for event in (*node.events, *node.rows) for gap in event.gaps)]
+    return [*node.rhs, *(gap for condition in node.conditions for gap in condition.gaps)]
 
 
 def symbols_in(expressions: Iterable[sp.Expr]) -> set[sp.Symbol]:
@@ -420,13 +420,13 @@ class LoopedSeries(TaylorStepWriter):
         self.node_part, self.lent = section, series[size:]
         section.lent += [s for s in series[size:] if not isinstance(s, Constant)]
         first = 0
-        for event in (*node.events, *node.rows):
-            indices = GAPS[first : first + len(event.gaps)]
+        for condition in node.conditions:
+            indices = GAPS[first : first + len(condition.gaps)]
             first += len(indices)
-            series = tuple(Outer(Slot("gaps", index)) for index in indices)
+            gaps = tuple(Outer(Slot("gaps", index)) for index in indices)
             sizes = tuple(Load("dense", plus(Name("at_sizes"), index)) for index in indices)
-            mode, names = self.called.get(event.mode.name, "t"), ("rise", "fall")[: len(indices)]
-            section.contacts.append(Gaps(mode, "stuck", series, names, sizes, Name("at_closing")))
+            mode, names = self.called.get(condition.mode.name, "t"), ("rise", "fall")[: len(indices)]
+            section.contacts.append(Gaps(mode, "stuck", gaps, names, sizes, Name("at_closing")))
         return section
 
     def link(self, joint: Joint, hoisted: Hoisted) -> SeriesLoop:

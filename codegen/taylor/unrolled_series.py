@@ -17,6 +17,8 @@ import sympy as sp
 from synchain.models.dynamics.angles import periods_of_states
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Edge, Node
+from synchain.models.mechanics.events import Event
+from synchain.models.mechanics.rows import Row
 
 from ..program.expressions import ONE, ZERO, Compare, Expression, Load, Name, Negation, Number, call, plus
 from ..program.passes import Names, real
@@ -223,9 +225,10 @@ class UnrolledSeries(TaylorStepWriter):
         eq, shared = self.equations, self.supply.fresh("shared_")
         moving, constant = self.of_network()
         for i in range(eq.n):
-            for k, event in enumerate((*eq.events_at(i), *eq.rows_at(i))):
-                series = tuple(self.graph.read(Template.of(event.gaps, moving, shared), moving, constant))
-                name = self.called.get(event.mode.name, f"guard_{i}_{k}")
+            conditions: tuple[Event | Row, ...] = (*eq.events_at(i), *eq.rows_at(i))
+            for k, condition in enumerate(conditions):
+                series = tuple(self.graph.read(Template.of(condition.gaps, moving, shared), moving, constant))
+                name = self.called.get(condition.mode.name, f"guard_{i}_{k}")
                 sizes = tuple(f"size_{name}_{way}" for way in ("rise", "fall")[: len(series)])
                 room = Number(self.lines.room + 2 * (self.order + 1))
                 yield Gaps(name, f"stuck_{name}", series, sizes, tuple(map(Name, sizes)), room)

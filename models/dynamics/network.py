@@ -110,8 +110,8 @@ def node(
             )
         speeds = dict(zip(velocities, positions, strict=True))
         smooth, surfaces = _contacts(accelerations, speeds, law, w, static)
-        state, rates, held = with_rows((*positions, *velocities), (*velocities, *smooth), surfaces, speeds)
-        return Node(state, rates, symbols, rows=held, law=coefficient(SLIDING))
+        state, rhs, held = with_rows((*positions, *velocities), (*velocities, *smooth), surfaces, speeds)
+        return Node(state, rhs, symbols, rows=held, law=coefficient(SLIDING))
     rates = (e.replace(FRICTION, coefficient) for e in accelerations)
     return Node((*positions, *velocities), (*velocities, *rates), symbols, law=coefficient(SLIDING), inertia=inertia)
 

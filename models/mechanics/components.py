@@ -43,8 +43,8 @@ class Node:
             if self.state[2:3] != (event.mode,):
                 raise ValueError(f"a node with set-valued friction has the states x, v, slip, …; found {self.state}")
             _check("contact", event.expressions, len(event.expressions), declared)
-        for row in self.rows:
-            _check("row", row.expressions, len(row.expressions), declared | {row.mode})
+        for held in self.rows:
+            _check("row", held.expressions, len(held.expressions), declared)
         if self.inertia and self.sticks:
             raise ValueError("node: found events beside a mass matrix; expected at most three coupled coordinates")
         if self.inertia and len(self.inertia) != size:
@@ -74,14 +74,19 @@ class Node:
         return (*(e.mode for e in self.events), *(row.mode for row in self.rows if row.law is not Law.RESET))
 
     @property
+    def conditions(self) -> tuple[Event | Row, ...]:
+        """Events and rows."""
+        return (*self.events, *self.rows)
+
+    @property
     def sticks(self) -> bool:
-        """True if the node has events."""
-        return bool(self.events or self.rows)
+        """True if the node has events or rows."""
+        return bool(self.conditions)
 
     @property
     def expressions(self) -> tuple[sp.Expr, ...]:
         """The right-hand side, the conditions of events and the entries of M."""
-        conditions = (e for event in (*self.events, *self.rows) for e in event.expressions)
+        conditions = (e for condition in self.conditions for e in condition.expressions)
         return (*self.rhs, *conditions, *_entries((self.inertia,)))
 
     @property
@@ -92,7 +97,7 @@ class Node:
     def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Node:
         """Return the node with every symbol and expression changed."""
         state, rhs, parameters = (tuple(map(change, part)) for part in (self.state, self.rhs, self.parameters))
-        events, rows = (tuple(event.map(change) for event in each) for each in (self.events, self.rows))
+        events, rows = tuple(e.map(change) for e in self.events), tuple(row.map(change) for row in self.rows)
         # Drop parameters that `change` replaced by numbers.
         return Node(
             state, rhs, tuple(p for p in parameters if p.is_Symbol), events, rows, inertia=_mapped(self.inertia, change)

@@ -265,10 +265,6 @@ def models() -> list[tuple[str, str | None]]:
      for contact in (ContactModel if friction else ["atan"])],
 )  # fmt: skip
 def test_parameters_are_those_of_the_equations(oscillator: str, friction: str | None, contact: str) -> None:
-    if contact == "set-valued" and friction and len(oscillator_of(oscillator).coordinates) > 1:
-        with pytest.raises(ValueError, match=r"set-valued contact: .* coordinates; expected one"):
-            node(oscillator, friction, contact)
-        return
     single = node(oscillator, friction, contact)
     table = parameters(oscillator, friction, contact)
     assert tuple(table) == tuple(s.name for s in single.parameters)
