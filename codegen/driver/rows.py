@@ -9,7 +9,7 @@ Linear Complementarity Problem (Academic Press, 1992), chapter 3).  Else the cel
 
 A stop whose rebounds would end soon is closed at once.  After a rebound with the speed u against the acceleration a the
 remaining ones take the time 2 u/(a (1 - e)) and pass on the same momentum as one plastic impact; the error is of the
-order u**3/(a**2 (1 - e)) (Budd & Dux, Phil. Trans. R. Soc. A 347, 365 (1994)).
+order u**3/(a**2 (1 - e)), which must be below atol, or the height u**2/(2 a) of the rebound below FLAT (Budd & Dux, Phil. Trans. R. Soc. A 347, 365 (1994)).
 """
 
 from __future__ import annotations
@@ -34,6 +34,8 @@ UNTOUCHED, KNOWN, OPEN, RELEASED = 0.0, 1.0, 2.0, 3.0
 ROLE, BEFORE, SPEED_BEFORE, X = 0, 1, 2, 3
 # A pivot, or a change of a speed, this much smaller than what it is the difference of is zero.
 NONE = 1e-12
+# A rebound of this height is about as small as a step sees.
+FLAT = 1e-12
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -294,6 +296,8 @@ def ends_soon(speed, inward, e, atol):
     """Return True if a stop rebounds so slowly that it may close: what is lost is below the tolerance."""
     if not (inward > 0.0 and e < 1.0):
         return False
+    if speed * speed < 2.0 * FLAT * inward:
+        return True
     return speed < math.sqrt(atol) and speed * speed * speed < atol * inward * inward * (1.0 - e)
 
 

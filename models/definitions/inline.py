@@ -34,6 +34,7 @@ from ..interactions.coupling import WEIGHT, LagrangianCoupling
 from ..mechanics.components import TIME
 from ..mechanics.contact import SLIDING, ContactModel, FrictionLaw
 from ..mechanics.expression import RESERVED, exact
+from ..mechanics.impacts import EventDefinition, Friction, Reset, Stop
 from ..mechanics.lagrangian import check_masses_exist, mass_matrix
 from ..mechanics.oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel, Oscillator, Scaling
 from ..mechanics.parameter import Parameter, dimension
@@ -58,6 +59,7 @@ def Lagrangian(
     coordinates: Keyed | Iterable[Any] | None = None,
     friction: FrictionLaw | Expression | Keyed | None = None,
     contact: str | None = None,
+    events: Iterable[EventDefinition] = (),
     parameters: Keyed | None = None,
     initial: Keyed | None = None,
     scaling: Mapping[str, Mapping[str, Any]] | None = None,
@@ -88,6 +90,8 @@ def Lagrangian(
     contact : str, optional
         Treatment of the law's jump at zero velocity: "atan" (the default), "sign" or "set-valued".  A law without a
         jump never sticks.
+    events : iterable of Friction, Stop or Reset, optional
+        Contacts with a law of their own, stops, and resets of states.
     parameters : mapping, optional
         The default of each parameter: a number, or a `Parameter` with its range.
     initial : mapping, optional
@@ -150,16 +154,21 @@ def Lagrangian(
     acting = tuple(names.expression(f"force on {c}", on.get(c, 0)) for c in table)
     speeds = [sp.Symbol(speed, real=True) for speed in table.values()]
     _try(what, lambda: check_masses_exist(mass_matrix(kinetic - potential, speeds), speeds))
-    # A law or a contact requires a force that contains friction(…).
+    declared = _events(what, events, names, defaults, table)
+    if declared and scales is not None:
+        raise ValueError(f"{what}: found events beside a scaling; expected non-dimensional equations")
+    contacts = [event for event in declared if isinstance(event, Friction)]
+    # A law or a contact requires a force that contains friction(…), or a contact among the events.
     law = _law(what, friction, defaults)
-    rubs = any(force.has(FRICTION) for force in acting)
+    rubs = any(force.has(FRICTION) for force in acting) or any(event.law is None for event in contacts)
     for keyword, value in (("friction", law), ("contact", contact)):
-        if value is not None and not rubs:
+        if value is not None and not rubs and not (contacts and keyword == "contact"):
             raise ValueError(f"{what}: found {keyword} {str(value)!r}, but no force has friction(…); leave it out")
     treatment = ContactModel.ATAN if contact is None else ContactModel.parse("contact", contact)
     # The parameters of a law given as an expression belong to the law, not to the oscillator.
     written = law if isinstance(friction, sp.Expr | int | float) else None
-    node_parameters = names.used_parameters((*energies, *acting), written)
+    of_events = (e for event in declared for e in event.expressions)
+    node_parameters = names.used_parameters((*energies, *acting, *of_events), written)
     if scales is not None:
         scales = replace(scales, physical=FrozenDict({name: scales.physical[name] for name in node_parameters}))
     model = LagrangianModel(
@@ -169,6 +178,7 @@ def Lagrangian(
         acting,
         dissipation,
         scales,
+        declared,
     )
     start, citation = names.initial(initial), check_text("source", source, LONGEST_SOURCE)
     return Oscillator(name, node_parameters, model, start, law, treatment, source=citation)
@@ -177,6 +187,7 @@ def Lagrangian(
 def Field(
     rates: Mapping[Any, Expression],
     *,
+    events: Iterable[EventDefinition] = (),
     parameters: Keyed | None = None,
     initial: Keyed | None = None,
     source: str = "",
@@ -189,6 +200,8 @@ def Field(
     rates : mapping
         State -> rate, in the order of the states.  States are plain symbols, functions of time, or names.  Rates are
         expressions of SymPy, numbers, or texts, which are parsed, not run.
+    events : iterable of Reset, optional
+        Jumps of states where a guard passes zero.
     parameters : mapping, optional
         The default of each parameter: a number, or a `Parameter` with its range.
     initial : mapping, optional
@@ -234,10 +247,11 @@ def Field(
     field_rates = tuple(names.expression(f"rate of {s}", e) for s, e in zip(table, entries.values(), strict=True))
     if any(rate.has(FRICTION) for rate in field_rates):
         raise ValueError(f"{what}: found friction(…) in a rate; expected it in the forces of a Lagrangian")
-    model = FieldModel(tuple(table), field_rates)
+    declared = _events(what, events, names, defaults, None)
+    model = FieldModel(tuple(table), field_rates, declared)
     return Oscillator(
         name,
-        names.used_parameters(field_rates),
+        names.used_parameters(model.expressions),
         model,
         names.initial(initial),
         source=check_text("source", source, LONGEST_SOURCE),
@@ -399,6 +413,42 @@ def link_energy(
     potential, dissipation, kinetic = energies
     citation = check_text("source", source, LONGEST_SOURCE)
     return LagrangianCoupling(name, link_parameters, potential, dissipation, kinetic, kinds, source=citation)
+
+
+def _events(
+    what: str,
+    events: Iterable[object],
+    names: _ModelNames,
+    defaults: Mapping[str, Parameter],
+    coordinates: Mapping[str, str] | None,
+) -> tuple[EventDefinition, ...]:
+    """Convert the events of a model; of a field, `coordinates` is None and resets alone have a meaning."""
+    found: list[EventDefinition] = []
+    for k, event in enumerate(check_instance(f"{what}: events", events, (list, tuple), "a list of events")):
+        about = f"event {k + 1}"
+        expected = (Reset,) if coordinates is None else (Friction, Stop, Reset)
+        declared = check_instance(f"{what}: {about}", event, expected, " or ".join(kind.__name__ for kind in expected))
+        made = declared.map(
+            lambda part, value, about=about: names.expression(f"{about}: {part}", value),
+            lambda key, about=about: names.state(f"{about}: sets", key, names.states),
+        )
+        if isinstance(made, Friction):
+            if made.law is not None:
+                check_instance(f"{what}: {about}: law", made.law, (str, FrictionLaw), "a name, or a friction_law(…)")
+            made = replace(made, law=_law(f"{what}: {about}", made.law, defaults))
+        speeds = {sp.Symbol(name, real=True) for name in (coordinates or {}).values()}
+        if isinstance(made, Stop) and (
+            made.gap.free_symbols & speeds or not made.gap.free_symbols & _reals(coordinates)
+        ):
+            raise ValueError(f"{what}: {about}: found the gap {made.gap}; expected a function of coordinates and time")
+        if any(e.has(FRICTION) for e in made.expressions):
+            raise ValueError(f"{what}: {about}: found friction(…); expected it in the forces Q alone")
+        found.append(made)
+    return tuple(found)
+
+
+def _reals(names: Iterable[str] | None) -> set[sp.Symbol]:
+    return {sp.Symbol(name, real=True) for name in names or ()}
 
 
 def _called(name: object) -> str:

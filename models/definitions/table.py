@@ -14,12 +14,13 @@ from ..interactions.coupling import WEIGHT, Coupling, LagrangianCoupling, Matrix
 from ..mechanics.components import TIME
 from ..mechanics.contact import SLIDING, ContactModel, FrictionLaw
 from ..mechanics.expression import read, written
+from ..mechanics.impacts import EventDefinition, Friction, Reset, Stop
 from ..mechanics.oscillator import Coordinate, FieldModel, LagrangianModel, Oscillator, Scaling
 from ..mechanics.parameter import Parameter
 from .inline import Field, Lagrangian, friction_law, link_energy
 from .loader import load_friction_law, load_oscillator, read_coupling
 
-_COMMON = ("name", "source", "parameters", "initial")
+_COMMON = ("name", "source", "parameters", "initial", "events")
 _FIELD = (*_COMMON, "rates")
 _LAGRANGIAN = (
     *_COMMON,
@@ -34,6 +35,7 @@ _LAGRANGIAN = (
 )
 _LAW = ("name", "source", "parameters", "force", "static", "order", "self_exciting")
 _LINK = ("name", "source", "parameters", "energies", "on")
+_EVENTS = {"friction": ("load", "law"), "stop": ("restitution",), "reset": ("sets",)}
 _ENERGIES = ("potential", "dissipation", "kinetic")
 
 
@@ -42,6 +44,7 @@ def oscillator_of_table(table: Mapping[object, Any]) -> Oscillator:
     first_order = "rates" in table
     check_keys("oscillator", table, _FIELD if first_order else _LAGRANGIAN)
     keywords = {str(key): value for key, value in table.items()}
+    keywords["events"] = _events(keywords.get("events", []))
     if first_order:
         return Field(_texts("oscillator: rates", keywords.pop("rates")), **keywords)
     for key in ("coordinates", "kinetic"):
@@ -106,6 +109,28 @@ def _law(value: object) -> FrictionLaw | None:
     return None if name == "none" else load_friction_law(name)
 
 
+def _events(value: object) -> list[EventDefinition]:
+    """Make events from their tables."""
+    if not isinstance(value, list | tuple):
+        raise TypeError(f"oscillator: events: found {typed_repr(value)}; expected a list of tables")
+    found: list[EventDefinition] = []
+    for k, entry in enumerate(value):
+        what = f"oscillator: events[{k + 1}]"
+        event = check_table(what, entry)
+        kind = next((word for word in _EVENTS if word in event), None)
+        if kind is None:
+            raise ValueError(f"{what}: found {short_repr(dict(event))}; expected one of {', '.join(_EVENTS)}")
+        check_keys(what, event, (kind, *_EVENTS[kind]))
+        level = _text(f"{what}: {kind}", event[kind])
+        if kind == "friction":
+            found.append(Friction(level, _text(f"{what}: load", event.get("load", 1)), _law(event.get("law"))))
+        elif kind == "stop":
+            found.append(Stop(level, _text(f"{what}: restitution", event.get("restitution", 0))))
+        else:
+            found.append(Reset(level, _texts(f"{what}: sets", event.get("sets", {}))))
+    return found
+
+
 def _text(what: str, value: object) -> Any:
     """Check an expression of a file: a text or a number."""
     if isinstance(value, bool) or not isinstance(value, str | int | float):
@@ -165,10 +190,21 @@ def _oscillator_table(node: Oscillator) -> dict[str, Any]:
             table["friction"] = as_name_or_table(node.friction)
         if node.contact != ContactModel.ATAN:
             table["contact"] = str(node.contact)
+    if model.events:
+        table["events"] = [_event_table(event, texts) for event in model.events]
     table["parameters"] = _parameter_tables(node.parameters)
     if node.initial is not None:
         table["initial"] = {str(name): float(value) for name, value in node.initial.items()}
     return table
+
+
+def _event_table(event: EventDefinition, texts: _Texts) -> dict[str, Any]:
+    if isinstance(event, Friction):
+        law = {} if not isinstance(event.law, FrictionLaw) else {"law": as_name_or_table(event.law)}
+        return {"friction": texts.write(event.sliding), "load": texts.write(event.load), **law}
+    if isinstance(event, Stop):
+        return {"stop": texts.write(event.gap), "restitution": texts.write(event.restitution)}
+    return {"reset": texts.write(event.guard), "sets": {s: texts.write(e) for s, e in event.sets.items()}}
 
 
 def _lagrangian_table(model: LagrangianModel, texts: _Texts) -> dict[str, Any]:

@@ -6,7 +6,7 @@ equations of a node are therefore those of the single oscillator plus one force 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
@@ -20,15 +20,16 @@ from ..inputs.plugins import names
 from ..interactions.coupling import Coupling, LagrangianCoupling, MatrixCoupling, Potential
 from ..interactions.link import edge
 from ..interactions.separation import separated
-from ..mechanics.calculus import cancelled, expanded
+from ..mechanics.calculus import cancelled, derivative, expanded
 from ..mechanics.components import WEIGHT_NUMBER, Block, Edge, Node
 from ..mechanics.contact import KAPPA, SLIDING, ContactModel, FrictionLaw, regularise
 from ..mechanics.events import on_steady_ground, set_valued
+from ..mechanics.impacts import EventDefinition, Reset, Stop
 from ..mechanics.lagrangian import LARGEST_BY_MINORS, check_masses_exist, coupled, solve_masses
 from ..mechanics.nondimensional import friction_coefficient, nondimensional, scale, static_coefficient
 from ..mechanics.oscillator import FRICTION, FieldModel, LagrangianModel, Oscillator
 from ..mechanics.parameter import Parameter
-from ..mechanics.rows import Surface, friction_surface, with_rows
+from ..mechanics.rows import Law, Surface, friction_surface, with_rows
 from .equations import Equations, Layer
 
 FEW = 8
@@ -51,10 +52,13 @@ def parameters(
         raise ValueError(f"oscillator {oscillator.name!r} takes no friction law, found {friction.name!r}; leave it out")
     # In this order: parameters of the oscillator, its friction law, the smoothing of contacts, the couplings.
     table: dict[str, Parameter] = dict(oscillator.parameters)
-    if friction is not None:
-        _join(table, friction.parameters, f"friction law {friction.name!r}")
-        if contact == ContactModel.ATAN and regularise(friction.force, SLIDING, sp.Symbol("kappa")) != friction.force:
-            _join(table, {"kappa": KAPPA}, f"contact {str(contact)!r}")
+    laws = [*([] if friction is None else [friction]), *oscillator.laws.values()]
+    for law in dict.fromkeys(laws):
+        _join(table, law.parameters, f"friction law {law.name!r}")
+    if contact == ContactModel.ATAN and any(
+        regularise(law.force, SLIDING, sp.Symbol("kappa")) != law.force for law in laws
+    ):
+        _join(table, {"kappa": KAPPA}, f"contact {str(contact)!r}")
     for coupling in couplings:
         _join(table, coupling.parameters, f"coupling {str(coupling)!r}", _free_spelling(coupling, oscillator))
     return {name: replace(p, scale=str(scale(oscillator, p.unit))) for name, p in table.items()}
@@ -74,9 +78,10 @@ def node(
     Raises ValueError as `parameters` does.
     """
     symbols = tuple(sp.Symbol(name, real=True) for name in parameters(oscillator, friction, contact))
+    events = oscillator.model.events
     if isinstance(oscillator.model, FieldModel):
         state = tuple(sp.Symbol(name, real=True) for name in oscillator.model.state)
-        return Node(state, oscillator.model.rates, symbols)
+        return _with_surfaces(state, oscillator.model.rates, _resets(events), {}, symbols)
 
     # Solve M dv/dt = r in symbols. With too many coupled coordinates keep M, with identity rows for the coordinates.
     system = nondimensional(oscillator)
@@ -89,39 +94,70 @@ def node(
         check_masses_exist(masses, velocities)
         accelerations = expanded(r)
         inertia = tuple(map(expanded, sp.diag(sp.eye(masses.rows), masses).tolist()))
-    if friction is None:
-        return Node((*positions, *velocities), (*velocities, *accelerations), symbols, inertia=inertia)
 
-    # The friction law takes the place of the unknown function f(w).
-    coefficient = friction_coefficient(friction, contact)
-    if contact == ContactModel.SET_VALUED and friction.jumps:
+    # Friction laws take the place of the unknown function f(w), or f(w, k) for the law of event k.
+    laws: dict[object, FrictionLaw] = {**oscillator.laws} | ({} if friction is None else {None: friction})
+    coefficients = {k: friction_coefficient(law, contact) for k, law in laws.items()}
+    law = None if friction is None else coefficients[None](SLIDING)
+    sticking = {k for k, each in laws.items() if contact == ContactModel.SET_VALUED and each.jumps}
+    smooth = [
+        e.replace(FRICTION, lambda w, k=None: FRICTION(*_numbered(w, k)) if k in sticking else coefficients[k](w))
+        for e in accelerations
+    ]
+    stops = [event for event in events if isinstance(event, Stop)]
+    plain = not rows and not events and on_steady_ground(smooth, FRICTION, positions, velocities)
+    if sticking and friction is not None and plain:
+        (x,), (v,) = positions, velocities
         w = sp.Dummy("w", real=True)
-        law, static = coefficient(w), static_coefficient(friction)
-        if not rows and on_steady_ground(accelerations, FRICTION, positions, velocities):
-            (x,), (v,) = positions, velocities
-            rate, event = set_valued(accelerations[0], FRICTION, law, w, static, v)
-            return Node(
-                (x, v, event.mode), (v, event.mode**2 * rate, sp.S.Zero), symbols, (event,), law=coefficient(SLIDING)
-            )
-        if inertia:
-            raise ValueError(
-                f"set-valued contact: found {len(coupled(masses))} coordinates that the masses couple; expected at most "
-                f"{LARGEST_BY_MINORS}; use contact 'atan'"
-            )
-        speeds = dict(zip(velocities, positions, strict=True))
-        smooth, surfaces = _contacts(accelerations, speeds, law, w, static)
-        state, rhs, held = with_rows((*positions, *velocities), (*velocities, *smooth), surfaces, speeds)
-        return Node(state, rhs, symbols, rows=held, law=coefficient(SLIDING))
-    rates = (e.replace(FRICTION, coefficient) for e in accelerations)
-    return Node((*positions, *velocities), (*velocities, *rates), symbols, law=coefficient(SLIDING), inertia=inertia)
+        rate, event = set_valued(smooth[0], FRICTION, coefficients[None](w), w, static_coefficient(friction), v)
+        return Node((x, v, event.mode), (v, event.mode**2 * rate, sp.S.Zero), symbols, (event,), law=law)
+    if inertia and (sticking or events):
+        raise ValueError(
+            f"events: found {len(coupled(masses))} coordinates that the masses couple; expected at most {LARGEST_BY_MINORS}; "
+            "use contact 'atan', and no stops or resets"
+        )
+    speeds = dict(zip(velocities, positions, strict=True))
+    smooth, surfaces = _contacts(smooth, speeds, coefficients, laws)
+    zeros = [sp.S.Zero] * len(positions)
+    for stop in stops:
+        push = solve_masses(masses, [derivative(stop.gap, x) for x in positions], velocities)
+        surfaces.append(Surface(Law.STOP, stop.gap, (*zeros, *push), stop.restitution))
+    surfaces += _resets(events)
+    node = _with_surfaces((*positions, *velocities), (*velocities, *smooth), surfaces, speeds, symbols)
+    return replace(node, law=law, inertia=inertia)
+
+
+def _numbered(w: sp.Expr, k: sp.Expr | None) -> tuple[sp.Expr, ...]:
+    return (w,) if k is None else (w, k)
+
+
+def _resets(events: Sequence[EventDefinition]) -> list[Surface]:
+    resets = (event for event in events if isinstance(event, Reset))
+    return [
+        Surface(Law.RESET, event.guard, sets=tuple((sp.Symbol(s, real=True), e) for s, e in event.sets.items()))
+        for event in resets
+    ]
+
+
+def _with_surfaces(
+    state: tuple[sp.Symbol, ...],
+    rates: tuple[sp.Expr, ...],
+    surfaces: Sequence[Surface],
+    speeds: Mapping[sp.Symbol, sp.Symbol],
+    parameters: tuple[sp.Symbol, ...],
+) -> Node:
+    """Return a node of these states and rates, with rows if there are surfaces."""
+    if not surfaces:
+        return Node(state, rates, parameters)
+    states, rhs, rows = with_rows(state, rates, surfaces, speeds)
+    return Node(states, rhs, parameters, rows=rows)
 
 
 def _contacts(
     accelerations: Sequence[sp.Expr],
     speeds: Mapping[sp.Symbol, sp.Symbol],
-    law: sp.Expr,
-    argument: sp.Symbol,
-    static: sp.Expr | None,
+    coefficients: Mapping[object, Callable[[sp.Expr], sp.Expr]],
+    laws: Mapping[object, FrictionLaw],
 ) -> tuple[list[sp.Expr], list[Surface]]:
     """Return the accelerations without friction, and the row of each contact f(w)."""
     velocities = list(speeds)
@@ -143,7 +179,9 @@ def _contacts(
                 f"set-valued contact: found the sliding velocity {sliding}; expected a linear function of velocities"
             )
         felt = [v for v, e in zip(velocities, slopes, strict=True) if e != 0]
-        surface = friction_surface(sliding, (*[sp.S.Zero] * len(pull), *pull), law, argument, static)
+        k, w = f.args[1] if len(f.args) > 1 else None, sp.Dummy("w", real=True)
+        static = static_coefficient(laws[k])
+        surface = friction_surface(sliding, (*[sp.S.Zero] * len(pull), *pull), coefficients[k](w), w, static)
         surfaces.append(replace(surface, name=speeds[felt[0]].name if len(felt) == 1 else ""))
     return smooth, surfaces
 

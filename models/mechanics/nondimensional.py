@@ -13,6 +13,7 @@ import sympy as sp
 from .calculus import derivative
 from .components import TIME
 from .contact import SLIDING, ContactModel, FrictionLaw, regularise
+from .impacts import Friction
 from .lagrangian import Mechanics
 from .oscillator import FRICTION, LagrangianModel, Oscillator
 from .parameter import Parameter, dimension
@@ -49,6 +50,14 @@ def physical(oscillator: Oscillator) -> Mechanics:
     if model.dissipation != 0:  # Rayleigh: Q = -dR/dv
         lost = (derivative(model.dissipation, speed) for speed in speeds)
         forces = tuple(force - rate for force, rate in zip(forces, lost, strict=True))
+    for k, event in enumerate(model.events):
+        if isinstance(event, Friction):  # virtual work: the force on a coordinate is -load f(w) dw/dv
+            number = () if event.law is None else (sp.Integer(k),)
+            coefficient = event.load * FRICTION(event.sliding, *number)
+            forces = tuple(
+                force - coefficient * derivative(event.sliding, speed)
+                for force, speed in zip(forces, speeds, strict=True)
+            )
     positions = tuple(_real(c.name) for c in model.coordinates)
     return Mechanics(positions, speeds, model.kinetic, model.potential, forces)
 

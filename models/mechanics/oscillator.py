@@ -10,6 +10,7 @@ import sympy as sp
 
 from ..inputs.frozen import FrozenDict
 from .contact import ContactModel, FrictionLaw
+from .impacts import EventDefinition, Friction
 from .parameter import Parameter, defaults_text
 
 FRICTION = sp.Function("f", real=True)
@@ -79,11 +80,13 @@ class LagrangianModel:
     forces: tuple[sp.Expr, ...]  # a generalised force for each coordinate, without the forces of `dissipation`
     dissipation: sp.Expr = sp.S.Zero  # Rayleigh's function R, half the power lost; -dR/dv is added to the forces
     scaling: Scaling | None = None  # the units of physical quantities
+    events: tuple[EventDefinition, ...] = ()
 
     @property
     def expressions(self) -> tuple[sp.Expr, ...]:
         """All expressions of the system."""
-        return self.kinetic, self.potential, *self.forces, self.dissipation
+        of_events = (e for event in self.events for e in event.expressions)
+        return self.kinetic, self.potential, *self.forces, self.dissipation, *of_events
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,11 +95,12 @@ class FieldModel:
 
     state: tuple[str, ...]
     rates: tuple[sp.Expr, ...]
+    events: tuple[EventDefinition, ...] = ()
 
     @property
     def expressions(self) -> tuple[sp.Expr, ...]:
         """All expressions of the field."""
-        return self.rates
+        return (*self.rates, *(e for event in self.events for e in event.expressions))
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +160,20 @@ class Oscillator:
     @property
     def takes_friction(self) -> bool:
         """True if the forces contain a friction coefficient, so that the oscillator needs a friction law."""
-        return any(e.has(FRICTION) for e in self.model.expressions)
+        contacts = (event for event in self.model.events if isinstance(event, Friction))
+        return any(e.has(FRICTION) for e in self.model.expressions) or any(event.law is None for event in contacts)
+
+    @property
+    def has_contact(self) -> bool:
+        """True if the treatment of jumps (`ContactModel`) changes the equations."""
+        surfaces = isinstance(self.model, FieldModel) and self.contact is ContactModel.SET_VALUED
+        return self.takes_friction or bool(self.laws) or surfaces
+
+    @property
+    def laws(self) -> dict[int, FrictionLaw]:
+        """The friction laws of single contacts, by the numbers of their events."""
+        pairs = ((k, event.law) for k, event in enumerate(self.model.events) if isinstance(event, Friction))
+        return {k: law for k, law in pairs if isinstance(law, FrictionLaw)}
 
     def __getattr__(self, name: str) -> sp.Symbol:
         if name not in Oscillator.__dict__ and name in self.states:

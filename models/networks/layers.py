@@ -48,12 +48,12 @@ def as_contact(value: object, oscillators: Iterable[Oscillator]) -> ContactModel
     """
     if value is not None:
         contact = ContactModel.parse("contact", value)
-        if contact is not ContactModel.ATAN and not any(oscillator.takes_friction for oscillator in oscillators):
+        if contact is not ContactModel.ATAN and not any(oscillator.has_contact for oscillator in oscillators):
             raise ValueError(
                 f"contact: found {str(contact)!r} and no node with friction; expected a node with friction"
             )
         return contact
-    contacts = dict.fromkeys(oscillator.contact for oscillator in oscillators if oscillator.takes_friction)
+    contacts = dict.fromkeys(oscillator.contact for oscillator in oscillators if oscillator.has_contact)
     if len(contacts) > 1:
         raise ValueError(f"contact: the nodes have {' and '.join(map(repr, contacts))}; expected one; give contact")
     return next(iter(contacts), ContactModel.ATAN)

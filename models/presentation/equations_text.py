@@ -17,7 +17,7 @@ from ..inputs.checks import check_instance
 from ..mechanics.components import TIME, WEIGHT_NUMBER, Edge, Node
 from ..mechanics.contact import SLIDING
 from ..mechanics.oscillator import FRICTION
-from ..mechanics.rows import off_surfaces
+from ..mechanics.rows import Law, off_surfaces
 from .writer import ExpressionWriter, Latex, Style, Text
 
 LARGEST = 6
@@ -104,6 +104,7 @@ def as_dict(equations: Equations) -> dict[str, object]:
 def lines(equations: Equations, style: Style) -> Iterator[str]:
     """Yield the equations, then the friction laws, then for a large network the meaning of the indices."""
     network = _NetworkText(_in_slip(equations), style)
+    rows = [row for node in equations.nodes for row in node.rows]
     generic = network.equations.n > LARGEST and not network.equations.mixed
     if generic:
         yield from network.generic()
@@ -111,10 +112,24 @@ def lines(equations: Equations, style: Style) -> Iterator[str]:
         for i in range(network.equations.n):
             yield from network.at_node(i)
     yield from network.laws()
-    if equations.sticks:
+    for node in equations.nodes:
+        yield from _events(node, style)
+    if any(node.events for node in equations.nodes) or any(row.law is Law.SIGN for row in rows):
         yield style.words("at zero sliding velocity f is what holds the body, up to the static coefficient")
     if generic:
         yield network.legend()
+
+
+def _events(node: Node, style: Style) -> Iterator[str]:
+    """Yield what happens at the stops and guards of a node."""
+    writer = ExpressionWriter(style, {}, frozenset())
+    for row in node.rows:
+        if row.law is Law.STOP:
+            gap, times = style.words("stop at the gap "), style.words(": its rate is reversed times ")
+            yield f"{gap}{writer.write(row.level)}{times}{writer.write(row.ratio)}"
+        elif row.law is Law.RESET:
+            jumps = ", ".join(f"{writer.write(s)} := {writer.write(e)}" for s, e in row.sets)
+            yield f"{jumps}{style.words(' where this passes 0 upwards: ')}{writer.write(row.level)}"
 
 
 def _in_slip(equations: Equations) -> Equations:

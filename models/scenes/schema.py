@@ -169,7 +169,13 @@ def _written_out() -> tuple[Table, Table]:
     keys = {"name": TEXT, "source": CITATION, "force": NUMBER, "static": NUMBER, "order": {"type": "array"}}
     table = _table({**keys, "self_exciting": {"type": "boolean"}, "parameters": anything}, "force")
     friction = {"anyOf": [*law["anyOf"], table]}
-    common = {"name": TEXT, "source": CITATION, "parameters": anything, "initial": anything}
+    events = [
+        _table({"friction": NUMBER, "load": NUMBER, "law": friction}, "friction"),
+        _table({"stop": NUMBER, "restitution": NUMBER}, "stop"),
+        _table({"reset": NUMBER, "sets": EXPRESSIONS}, "reset", "sets"),
+    ]
+    common = {"name": TEXT, "source": CITATION, "parameters": anything, "initial": anything,
+              "events": {"type": "array", "items": {"anyOf": events}}}  # fmt: skip
     field = _table({**common, "rates": EXPRESSIONS}, "rates")
     energies = {"coordinates": anything, "kinetic": NUMBER, "potential": NUMBER, "dissipation": NUMBER}
     more = {"forces": EXPRESSIONS, "friction": friction, "contact": contact, "scaling": anything}

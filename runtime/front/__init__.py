@@ -1,6 +1,7 @@
 """From a Lagrangian and a graph to exact equations, exact spectra, fast simulation and stability.
 
     Lagrangian, Field, friction_law                  one node
+    Friction, Stop, Reset                            its contacts, stops and jumps
     link_energy, Potential, Rates, ends              one link
     graphs                                           a graph; `topology.spectrum` holds its exact eigenvalues
     Scene, load_scene, Axis, Section                 a network with its numbers, starts and records
@@ -31,12 +32,15 @@ HOMES = {
     "Axis": "models.sweeps.axis",
     "Criterion": "runtime.synchronisation.criterion",
     "Field": "models.definitions.inline",
+    "Friction": "models.mechanics.impacts",
     "Lagrangian": "models.definitions.inline",
     "Parameter": "models.mechanics.parameter",
     "Potential": "models.interactions.interaction",
     "Rates": "models.interactions.interaction",
+    "Reset": "models.mechanics.impacts",
     "Scene": "models.scenes.scene",
     "Section": "models.scenes.section",
+    "Stop": "models.mechanics.impacts",
     "basin": "runtime.synchronisation.basin",
     "cluster_exponents": "runtime.stability.cluster_exponents",
     "compile": "runtime.sweeps.compiled",

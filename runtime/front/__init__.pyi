@@ -14,6 +14,9 @@ from synchain.models.inputs.expression_text import exprel as exprel
 from synchain.models.interactions.ends import ends as ends
 from synchain.models.interactions.interaction import Potential as Potential
 from synchain.models.interactions.interaction import Rates as Rates
+from synchain.models.mechanics.impacts import Friction as Friction
+from synchain.models.mechanics.impacts import Reset as Reset
+from synchain.models.mechanics.impacts import Stop as Stop
 from synchain.models.mechanics.oscillator import friction as friction
 from synchain.models.mechanics.parameter import Parameter as Parameter
 from synchain.models.scenes.energy import energy_terms as energy_terms

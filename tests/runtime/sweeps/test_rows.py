@@ -24,7 +24,7 @@ def contact(
 
 
 def scene(node, window: float, integrator: str, n: int = 1, **more) -> sc.Scene:
-    given = {"topology": sc.chain(n), "rtol": 1e-12, "atol": 1e-13, "record": (), **more}
+    given = {"topology": sc.graphs.chain(n), "rtol": 1e-12, "atol": 1e-13, "record": (), **more}
     return sc.Scene(node, transient=0, window=window, time_unit="time", integrator=integrator, **given)
 
 
@@ -102,7 +102,7 @@ CART = [0.152852421263816, -0.510469083756546, 0.122424618544015, -0.18518470455
 def test_lanes_and_equal_nodes_have_equal_bits(integrator: str) -> None:
     """Eight cells in lanes end as each by itself, and three equal nodes change their modes together."""
     strengths = np.linspace(0.1, 0.8, 8)
-    ring = scene(cart_pole(), 6.0, integrator, 3, topology=sc.ring(3),
+    ring = scene(cart_pole(), 6.0, integrator, 3, topology=sc.graphs.ring(3),
                  coupling="spring on x", initial={"x": [0.5, 0.1, 0.2], "th": [1.0, 0.2, -0.4]})  # fmt: skip
     together = end(ring, sigma=strengths)
     for k, strength in enumerate(strengths):
@@ -118,7 +118,7 @@ def test_layers_of_links_act_on_rows_as_one_layer_on_contacts(integrator: str, n
     node = contact(V**2 / 2, X**2 / 2, {X: sp.cos(R(9, 10) * T) / 2 + R(3, 10) * sc.friction(R(1, 5) - V)}, {X: V})
     spring = [sc.Potential(f"{k}*W*(x_i - x_j)**2/2", {k: value}) for k, value in (("k", 0.2), ("c", 0.1), ("s", 0.3))]
     start = {"x": list(np.linspace(-0.4, 0.9, n)), "v": list(np.linspace(0.3, -0.2, n))}
-    layers = scene(node, 12.0, integrator, links=[(spring[0], sc.chain(n)), (spring[1], sc.chain(n))], topology=None, initial=start)  # fmt: skip
+    layers = scene(node, 12.0, integrator, links=[(spring[0], sc.graphs.chain(n)), (spring[1], sc.graphs.chain(n))], topology=None, initial=start)  # fmt: skip
     one = scene(node, 12.0, integrator, n, coupling=spring[2], initial=start)
     assert layers.equations.has_rows
     assert not one.equations.has_rows
