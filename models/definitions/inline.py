@@ -426,12 +426,18 @@ def _events(
     found: list[EventDefinition] = []
     for k, event in enumerate(check_instance(f"{what}: events", events, (list, tuple), "a list of events")):
         about = f"event {k + 1}"
-        expected = (Reset,) if coordinates is None else (Friction, Stop, Reset)
-        declared = check_instance(f"{what}: {about}", event, expected, " or ".join(kind.__name__ for kind in expected))
-        made = declared.map(
-            lambda part, value, about=about: names.expression(f"{about}: {part}", value),
-            lambda key, about=about: names.state(f"{about}: sets", key, names.states),
+        expected: tuple[type[EventDefinition], ...] = (Reset,) if coordinates is None else (Friction, Stop, Reset)
+        declared: EventDefinition = check_instance(
+            f"{what}: {about}", event, expected, " or ".join(kind.__name__ for kind in expected)
         )
+
+        def change(part: str, value: object, about: str = about) -> sp.Expr:
+            return names.expression(f"{about}: {part}", value)
+
+        def state(key: object, about: str = about) -> str:
+            return names.state(f"{about}: sets", key, names.states)
+
+        made: EventDefinition = declared.map(change, state)
         if isinstance(made, Friction):
             if made.law is not None:
                 check_instance(f"{what}: {about}: law", made.law, (str, FrictionLaw), "a name, or a friction_law(…)")

@@ -215,11 +215,13 @@ def off_surfaces(rates: Sequence[sp.Expr], rows: Sequence[Row]) -> tuple[sp.Expr
         e.xreplace(free) - sp.Add(*(row.push[c].xreplace(free) for row in signs))
         for c, e in enumerate(rates[: len(rates) - len(free) + (NO_MODE in free)])
     )
-    return tuple(
-        sp.expand(e)
-        + sp.Add(*(row.push[c].xreplace({row.mode: sp.sign(row.level)}) * sp.sign(row.level) for row in signs))
-        for c, e in enumerate(smooth)
-    )
+    return tuple(sp.expand(e) + sp.Add(*(_by_sign(row.push[c], row) for row in signs)) for c, e in enumerate(smooth))
+
+
+def _by_sign(e: sp.Expr, row: Row) -> sp.Expr:
+    """Return s e of a push e with the sign s of the level in place of the mode."""
+    sign = sp.sign(row.level)
+    return sign * e.xreplace({row.mode: sign}).xreplace({sign**2: sp.S.One})
 
 
 def friction_surface(
