@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
+
+from numpydoc.xref import DEFAULT_LINKS
+
+import synchain
 
 sys.path.insert(0, str(Path(__file__).parent / "extensions"))
 
@@ -17,6 +22,8 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "numpydoc",
+    "sphinx_copybutton",
+    "sphinx_design",
     "sphinx_gallery.gen_gallery",
     "mathml",
     "checked_links",
@@ -25,15 +32,29 @@ extensions = [
     "recipes",
     "offline_animations",
 ]
+if "READTHEDOCS" in os.environ:  # links to other projects and cards for messengers need the network and an address
+    extensions += ["sphinx.ext.intersphinx", "sphinxext.opengraph"]
+    intersphinx_mapping = {
+        "python": ("https://docs.python.org/3", None),
+        "numpy": ("https://numpy.org/doc/stable", None),
+        "scipy": ("https://docs.scipy.org/doc/scipy", None),
+        "sympy": ("https://docs.sympy.org/latest", None),
+        "matplotlib": ("https://matplotlib.org/stable", None),
+        "xarray": ("https://docs.xarray.dev/en/stable", None),
+        "networkx": ("https://networkx.org/documentation/stable", None),
+    }
+    ogp_site_url = os.environ.get("READTHEDOCS_CANONICAL_URL", "")
+    ogp_social_cards = {"enable": False}
 exclude_patterns = ["gallery/README.rst", "tutorial/README.rst", "sg_execution_times.rst"]
 
 # Pages
-myst_enable_extensions = ["dollarmath", "deflist"]
+myst_enable_extensions = ["dollarmath", "deflist", "colon_fence"]
 myst_heading_anchors = 4
 html_theme = "furo"
 html_title = f"synchain {version}"
 html_theme_options = {"top_of_page_buttons": []}
 html_static_path = ["static"]
+html_logo = html_favicon = "static/logo.svg"
 html_css_files = ["site.css"]
 html_math_renderer = "mathml"
 html_copy_source = False
@@ -47,6 +68,15 @@ autodoc_typehints = "none"  # the docstrings say types in words, with shapes and
 autodoc_member_order = "bysource"
 autosummary_generate = False
 numpydoc_show_class_members = False  # `:members:` shows them
+numpydoc_xref_param_type = True  # types of arguments and results are links
+numpydoc_xref_ignore = {"of", "or", "optional", "shape"}
+numpydoc_xref_aliases = {
+    **({} if "READTHEDOCS" in os.environ else {name: name for name in DEFAULT_LINKS}),  # no inventories offline
+    **{name: f"synchain.{name}" for name in synchain.__all__ if name[0].isupper()},
+    **{name: f"synchain.{part}.{name}" for part in synchain.MODULES for name in getattr(synchain, part).HOMES},
+}
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
+copybutton_prompt_is_regexp = True
 
 # Tutorial and gallery: plain files that run when the site is built; what raises fails the build
 sphinx_gallery_conf = {
