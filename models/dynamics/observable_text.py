@@ -5,7 +5,8 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import sympy as sp
 
@@ -57,6 +58,25 @@ def as_value(what: str, value: object) -> sp.Expr:
         except (TypeError, ValueError) as error:
             raise type(error)(f"{what}: {str(error).removeprefix('observable: ')}") from None
     return _real(what, _parsed(what, text, "x_1 - x_2"))
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A condition on observables, such as ``mean(v_1) > 0.1 and maximum(x_1) < P/alpha``."""
+
+    text: str
+    truth: sp.Basic  # a relation of the symbols in `observed` and of parameters
+    observed: tuple[tuple[sp.Symbol, Observable], ...]  # the symbol of each observable
+
+
+def as_condition(what: str, value: object) -> Condition:
+    """Return the condition of a text: comparisons of observables, parameters and numbers, joined by and, or, not."""
+    text = check_text(what, value, LENGTH)
+    expression, reader = _parsed(what, text, "mean(x_1) > 0"), _OfWindow(what)
+    truth = reader.meaning(expression, lambda truth: truth)
+    if not reader.observed or isinstance(truth, sp.Expr):
+        raise ValueError(f"{what}: found {short_repr(text)}; expected a comparison of observables, e.g. mean(x_1) > 0")
+    return Condition(text, truth, tuple((symbol, observable) for observable, symbol in reader.observed.items()))
 
 
 def _read(what: str, text: str) -> Observable:
@@ -120,7 +140,7 @@ class _OfNodes(Expressions):
         except ValueError as error:
             raise NoMeaning(_reason(error)) from None
 
-    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Basic]]:
+    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[Any] | None]:
         if function in tuple(ObservedWindow):
             raise NoMeaning(
                 f"found {function} inside; expected values of an instant: over the window one is reduced once, outermost"
@@ -132,3 +152,51 @@ class _OfNodes(Expressions):
             return Expressions.call(self, function, arguments, options)
         except ValueError as error:
             raise NoMeaning(_reason(error)) from None
+
+
+_RELATIONS = {"<": sp.StrictLessThan, "<=": sp.LessThan, ">": sp.StrictGreaterThan, ">=": sp.GreaterThan}
+
+
+@dataclass(frozen=True, slots=True)
+class _OfWindow(Expressions):
+    """Read conditions on observables; each observable becomes a symbol."""
+
+    deepest = 60
+    functions = FUNCTIONS
+    observed: dict[Observable, sp.Symbol] = field(default_factory=dict)
+
+    def pieces(self) -> str:
+        return f"parameters, comparisons < <= > >=, and, or, not, and {', '.join((*ObservedWindow, *FUNCTIONS))}"
+
+    def name(self, name: str) -> sp.Basic:
+        return sp.pi if name == "pi" else sp.Symbol(name, real=True)
+
+    def compare(self, sign: str, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        if sign not in _RELATIONS:
+            raise NoMeaning(f"found {sign}; expected < <= > or >=, as an observable is seldom exactly a number")
+        return _RELATIONS[sign](self.value(a), self.value(b))
+
+    def junction(self, word: str, conditions: Sequence[sp.Basic]) -> sp.Basic:
+        return (sp.And if word == "and" else sp.Or)(*map(self._truth, conditions))
+
+    def contrary(self, condition: sp.Basic) -> sp.Basic:
+        return sp.Not(self._truth(condition))
+
+    def _truth(self, condition: sp.Basic) -> sp.Basic:
+        if isinstance(condition, sp.Expr):
+            raise NoMeaning(f"found the value {condition} in place of a comparison")
+        return condition
+
+    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[Any] | None]:
+        if function in tuple(ObservedWindow) and count == 1 and not options:
+            return (None,)
+        return Expressions.arguments(self, function, count, options)
+
+    def call(self, function: str, arguments: Sequence[Any], options: Mapping[str, str]) -> sp.Basic:
+        if function not in tuple(ObservedWindow):
+            return Expressions.call(self, function, arguments, options)
+        try:
+            observable = _read(self.what, f"{function}({arguments[0]})")
+        except ValueError as error:
+            raise NoMeaning(str(error).removeprefix(f"{self.what}: ")) from None
+        return self.observed.setdefault(observable, sp.Symbol(f"observed_{len(self.observed)}", real=True))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NoReturn
+from typing import Any, ClassVar, NoReturn, TypeVar
 
 import sympy as sp
 
@@ -90,6 +90,9 @@ class _Refusal(Exception):
     """An error with a complete message."""
 
 
+B = TypeVar("B", bound=sp.Basic)
+
+
 @dataclass(frozen=True, slots=True)
 class Expressions(Algebra[sp.Basic]):
     """Algebra of SymPy expressions; operands are checked before each operation, so that constants stay bounded.
@@ -105,8 +108,18 @@ class Expressions(Algebra[sp.Basic]):
 
     def read(self, expression: ParsedText) -> sp.Expr:
         """Return the value of an expression."""
+        value = self.meaning(expression, self.value)
+        steep = [e for e in value.atoms(sp.Pow) if e.exp.is_number and not abs(e.exp) <= EXPONENT]
+        if steep:
+            raise ValueError(
+                f"{self.what}: found the power {short_repr(steep[0])}; expected exponents up to {EXPONENT}"
+            )
+        return value
+
+    def meaning(self, expression: ParsedText, checked: Callable[[sp.Basic], B]) -> B:
+        """Return a value or a condition as `checked` returns it; errors become ValueError."""
         try:
-            value = self.value(expression.evaluate(self))
+            return checked(expression.evaluate(self))
         except _Refusal as refusal:
             raise ValueError(str(refusal)) from None
         except NoMeaning as error:
@@ -114,12 +127,6 @@ class Expressions(Algebra[sp.Basic]):
         except Exception as error:  # an error inside SymPy, e.g. for an undecidable comparison
             text, reason = short_repr(expression.text), " ".join(str(error).split())[:200]
             raise ValueError(f"{self.what}: {text} has no value: {reason or type(error).__name__}") from None
-        steep = [e for e in value.atoms(sp.Pow) if e.exp.is_number and not abs(e.exp) <= EXPONENT]
-        if steep:
-            raise ValueError(
-                f"{self.what}: found the power {short_repr(steep[0])}; expected exponents up to {EXPONENT}"
-            )
-        return value
 
     def pieces(self) -> str:
         """List, for messages, the names and functions that expressions may contain."""
@@ -181,7 +188,7 @@ class Expressions(Algebra[sp.Basic]):
             raise NoMeaning(f"found the power {short_repr(lower**upper)} of a number; expected a positive one")
         return lower**upper
 
-    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Basic]]:
+    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[Any] | None]:
         called = self._known(function)
         wanted = _COUNTS.get(called, 1)
         if options or (count < 2 if wanted is None else count != wanted):
