@@ -8,6 +8,7 @@ import numpy as np
 
 from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
+from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.scenes.scene import Scene
 from synchain.models.symmetries.clusters import clusters
 from synchain.runtime.bifurcation.equilibrium import Equilibrium
@@ -67,9 +68,21 @@ def swept(x: np.ndarray, low: float, high: float) -> Sweep:
 
 def basin() -> Basin:
     """Three starts: one synchronous, one not, one without an end."""
-    errors, codes = np.array([0.0, 0.5, np.inf]), np.array([1, 1, 2])
-    start, earlier = np.arange(12.0).reshape(3, 4), np.array([np.nan, 0.5, np.nan])
-    return Basin(PAIR, PAPER, 0.95, start, errors, codes, earlier, np.array([0, 2, 5]), -0.1, 0.01)
+    return Basin(
+        PAIR,
+        FrozenDict({"synchronous": "synchronous"}),
+        ("synchronous", "other", "approaching", "not finished", "leaving"),
+        PAPER,
+        0.95,
+        (),
+        (),
+        start=np.arange(12.0).reshape(1, 3, 4),
+        fate=np.array([[0, 1, 3]]),
+        error=np.array([[0.0, 0.5, np.inf]]),
+        status=np.array([[1, 1, 2]]),
+        exponent=np.array([-0.1]),
+        stderr=np.array([0.01]),
+    )
 
 
 def thresholds() -> Thresholds:

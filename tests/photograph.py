@@ -731,7 +731,7 @@ def _() -> Quantities:
 def _() -> Quantities:
     given = Scene(topology=chain(2), integrator="rodas5p")
     found = basin(given, sigma=0.1, samples=12, transient=5, window=2, workers=1, show_progress=False)
-    return _seen(found, "start", "error", "share", "interval", "message")
+    return _seen(found, "start", "error", "fate", "status", "exponent")
 
 
 @scene("three-oscillator probe of friction", long=True)

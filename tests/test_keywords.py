@@ -40,7 +40,7 @@ ORBITS = {"workers", "show_progress", "progress", "parameters", "seed", "precisi
 TAKEN = {
     "run": CELLS,
     "stream": CELLS,
-    "basin": CELLS | {"seed", "transient"},
+    "basin": CELLS | {"transient"},
     "thresholds": CELLS | {"precision", "periods"},
     "universal_probe": CELLS,
     "exponents": ORBITS,
@@ -75,7 +75,7 @@ def test_the_shared_keywords_have_the_same_names_and_defaults(name: str) -> None
     for word in TAKEN[name]:
         assert parameters[word].default == OTHER.get((name, word), SHARED[word])
     assert [p.name for p in parameters.values() if p.kind is p.VAR_KEYWORD] == [
-        "axes" if name in ("run", "stream") else "more"
+        "axes" if name in ("basin", "run", "stream") else "more"
     ]
 
 
@@ -151,7 +151,7 @@ def test_what_a_function_cannot_use_is_refused_with_the_reason(name: str, word: 
         calls(DRIVEN, tmp_path / "a.nc")[name](**{word: 1})
 
 
-ONE_CELL = [(name, n) for name in sorted(set(TAKEN) - {"run", "stream"}) for n in (1, 2) if (name, n) != ("basin", 1)]
+ONE_CELL = [(name, n) for name in sorted(set(TAKEN) - {"basin", "run", "stream"}) for n in (1, 2)]
 
 
 @pytest.mark.parametrize(("name", "n"), ONE_CELL)
@@ -172,7 +172,7 @@ def test_one_cell_stands_for_no_sweep(name: str, n: int, changes: dict[str, Any]
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(("name", "n"), [(name, n) for name, n in ONE_CELL if name != "basin"])
+@pytest.mark.parametrize(("name", "n"), ONE_CELL)
 def test_a_stop_is_refused_where_nothing_stops(name: str, n: int, tmp_path: Any) -> None:
     stopped = DRIVEN.replace(topology=chain(n), stop="x_1 - 9")
     with pytest.raises(ValueError, match=rf"^{name}: found stop = 'x_1 - 9'; .*replace\(stop=None\)$"):
@@ -227,7 +227,7 @@ def test_an_axis_of_the_strength_is_no_choice_where_nothing_depends_on_it(name: 
 
 def test_an_axis_of_the_strength_is_refused_where_something_depends_on_it(tmp_path: Any) -> None:
     swept = DRIVEN.replace(axes={"sigma": [0.1, 0.3]})
-    for name in ("basin", "cluster_exponents", "lyapunov_spectrum"):
+    for name in ("cluster_exponents", "lyapunov_spectrum"):
         with pytest.raises(ValueError, match=f"^{name}: found axes of sigma; "):
             calls(swept, tmp_path / "a.nc")[name]()
     with pytest.raises(ValueError, match=r"^plane: found axes of sigma; "):

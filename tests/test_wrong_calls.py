@@ -125,7 +125,7 @@ CALLS = [
     (lambda: synchain.basin(PAIR, ranges={"x": 3}), "range of x"),
     (lambda: synchain.basin(PAIR, ranges={"x": ("a", "b")}), "range of x: found"),
     (lambda: synchain.basin(PAIR, tolerance="a"), "tolerance: 'a'"),
-    (lambda: synchain.basin(PAIR, seed=-1), "seed = -1"),
+    (lambda: synchain.basin(PAIR, rng=-1), "rng = -1"),
     (lambda: synchain.basin(PAIR, samples=10**12), "samples = 1000000000000; expected at most 10000000"),
     (
         lambda: synchain.basin(PAIR, smaples=3),

@@ -194,6 +194,37 @@ class RowsJob:
         return buffers
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class LadderSpec:
+    """A reduced scene whose cells come as rows; each cell may change its integrator, as in a sweep."""
+
+    reduction: ReducedScene
+
+    def source(self, width: int | None = None) -> SweepKernel:
+        """Return the text of the kernel."""
+        return write_kernel(self.reduction, width)
+
+    def job(self, spec: JobSpec, kernel: Kernel) -> LadderJob:
+        """Return the job that runs the kernel."""
+        return LadderJob(spec, LadderEngine(self.reduction, kernel, 0))
+
+
+@dataclass(slots=True)
+class LadderJob:
+    """Run any rows of a reduced scene with an engine."""
+
+    spec: JobSpec
+    engine: Engine
+
+    def cancel(self) -> None:
+        """End all cells that run in this process."""
+        self.engine.cancel()
+
+    def run(self, rows: CellRows) -> Buffers:
+        """Run the cells of these rows."""
+        return self.engine.run(rows)
+
+
 @cache
 def versions() -> str:
     """Return the versions of software on which a result depends."""

@@ -26,12 +26,13 @@ from ..stability.lyapunov import Lyapunov
 from ..stability.msf import MSF, Plane
 from ..sweeps.run import run
 from ..sweeps.stream import Streamed
-from ..synchronisation.basin import Basin, Fate
+from ..synchronisation.basin import Basin
 from ..synchronisation.critical import Critical
 from ..synchronisation.mismatch import Mismatch
 from ..synchronisation.probe import Probe
 from ..synchronisation.threshold import Thresholds
 from ..synchronisation.transition import Transition, TransitionCheck
+from .basin_plot import draw_basin
 from .branch_marks import MARK, MARKERS, STABLE, UNSTABLE
 from .canvas import axes_of, check_style, line_style
 from .exponent import draw_exponent, finite
@@ -114,18 +115,8 @@ def _(value: Thresholds, axes: Axes, **style: Any) -> Axes:
 
 
 @_draw.register
-def _(value: Basin, axes: Axes, **style: Any) -> Axes:
-    """Draw initial states by the first two components of the first node, coloured by their `Fate`."""
-    initial, names = value.data.initial.values[:, :2, 0], [str(name) for name in value.data.component.values[:2]]
-    across, up = (initial[:, 0], initial[:, -1])
-    colours = (BLUE, GREEN, ORANGE, PURPLE, BLACK, GREY)
-    for k, (fate, colour) in enumerate(zip(Fate, colours, strict=True)):
-        chosen = value.fate == k
-        if chosen.any():
-            axes.plot(across[chosen], up[chosen], **line_style(style, **DOTS, markersize=2.5, color=colour, label=fate))
-    axes.set(xlabel=symbol(f"{names[0]}_1"), ylabel=symbol(f"{names[-1]}_1"))
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
-    return axes
+def _(value: Basin, axes: Axes, kind: str | None = None, **style: Any) -> Axes:
+    return draw_basin(axes, value, kind, style)
 
 
 @_draw.register

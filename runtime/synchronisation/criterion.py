@@ -28,6 +28,7 @@ __all__ = [
     "applied",
     "checked",
     "errors",
+    "final_errors",
     "offsets",
     "preset",
     "resolved",
@@ -228,11 +229,16 @@ def errors(outcome: Outcome, criterion: AppliedCriterion, equations: Equations) 
     """
     if not criterion.relative:
         return outcome.error
-    states = outcome.end[:, columns_of(equations)]
+    return np.fmax(outcome.error, final_errors(outcome.end, criterion, equations))
+
+
+def final_errors(end: np.ndarray, criterion: AppliedCriterion, equations: Equations) -> np.ndarray:
+    """Return the errors (cells,) of states (cells, dimension): the largest of a component, in units of its extent."""
+    states = end[:, columns_of(equations)]
     apart = np.abs(states - states[..., :1]).sum(axis=-1)
     moves = np.array(criterion.extent) > 0.0
     shares = apart[:, moves] / np.array(criterion.extent)[moves]
-    return np.fmax(outcome.error, criterion.size * shares.max(axis=-1, initial=0.0))
+    return np.asarray(criterion.size * shares.max(axis=-1, initial=0.0))
 
 
 def offsets(criterion: AppliedCriterion) -> np.ndarray:

@@ -15,10 +15,11 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
 from ..cells.layout import block_size
+from ..cells.observable_arrays import ObservableArrays
 from ..cells.plan import CellRows
 from ..cells.reduce import ReducedScene
 from ..engines.choice import chosen_for_rows
-from ..engines.job import JobSpec, RowsSpec
+from ..engines.job import JobSpec, LadderSpec, RowsSpec
 from ..engines.scene_kernels import write_kernel
 from ..engines.step_control import control_of
 from ..support.execution import Execution
@@ -37,6 +38,8 @@ class Outcome(NamedTuple):
     status: np.ndarray  # (cells,): status of each cell
     end: np.ndarray  # (cells, dimension): states at the end, NaN if a cell did not finish
     steps: np.ndarray  # (cells,): number of steps
+    reached: np.ndarray  # (cells, dimension): states where the cells stopped, finished or not
+    observed: np.ndarray  # (cells, any): observables over the window
 
 
 class Trials:
@@ -49,7 +52,7 @@ class Trials:
     def __init__(
         self,
         scene: Scene,
-        problem: RowsSpec,
+        problem: RowsSpec | LadderSpec,
         source: SweepKernel,
         execution: Execution,
         expand: Callable[[Buffers], Buffers] | None = None,
@@ -72,6 +75,15 @@ class Trials:
         problem = RowsSpec(reduction.equations, source.method, control, reduction.recording)
         return cls(reduction.scene, problem, source, execution, reduction.expand)
 
+    @classmethod
+    def by_ladder(cls, reduction: ReducedScene, execution: Execution) -> Trials:
+        """Return trials of a scene that is not reduced; the outcomes have its observables.
+
+        Each cell may change its integrator, as in `run`.
+        """
+        problem = LadderSpec(reduction)
+        return cls(reduction.scene, problem, problem.source(), execution)
+
     def __enter__(self) -> Trials:
         return self
 
@@ -82,6 +94,8 @@ class Trials:
         """Run a round of `count` cells."""
         error, status = np.full(count, np.inf), np.full(count, int(Status.NOT_RUN))
         end, steps = np.full((count, self.scene.equations.dimension), np.nan), np.zeros(count, dtype=np.int64)
+        reached = np.full_like(end, np.nan)
+        observed = np.full((count, ObservableArrays(self.scene).numbers), np.nan)
         reporter = self.execution.reporter(count)
         size = block_size(self.scene, self.width, self.execution.size, count)
 
@@ -89,6 +103,8 @@ class Trials:
             network = buffers if self.expand is None else self.expand(buffers)
             error[task.cells] = mean_errors(network)
             end[task.cells] = np.where(network.finished[:, None], network.end, np.nan)
+            reached[task.cells] = network.end
+            observed[task.cells] = network.sums[:, len(SumColumn) :]
             status[task.cells] = buffers.status
             steps[task.cells] = buffers.counts[:, [Count.ACCEPTED, Count.REJECTED]].sum(axis=1)
             reporter.add(tally(buffers.status))
@@ -107,7 +123,7 @@ class Trials:
             raise SweepFailed(f"the workers are lost ({problem})", finished, count) from problem
         finally:
             reporter.close()
-        return Outcome(error, status, end, steps)
+        return Outcome(error, status, end, steps, reached, observed)
 
 
 def mean_errors(buffers: Buffers) -> np.ndarray:

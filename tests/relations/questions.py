@@ -119,7 +119,7 @@ def of_basin(units: Units, change: Change, path: Path) -> Answer:
     box = dict(zip(scene.components, map(tuple, units.put([-2, 2], [-2, 2]).values()), strict=True))
     times = {"transient": 36.0 / units.k, "window": 4.0 / units.k}
     result = sc.basin(scene, samples=8, ranges=box, **times, **QUIET)
-    return {"share": np.array(result.share)}
+    return {"share": result.shares.sel(attractor="synchronous").values}
 
 
 def of_thresholds(units: Units, change: Change, path: Path) -> Answer:

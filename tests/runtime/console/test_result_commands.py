@@ -112,9 +112,14 @@ def test_init_writes_a_scene_that_runs(
 
 def test_basin_lyapunov_and_orbit_are_the_public_functions(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = folder / "pair.toml"
-    options = ["--samples", 5, "--window", 1, "--set", "sigma=0.3", "seed=2", "--json"]
+    options = ["--samples", 5, "--window", 1, "--set", "sigma=0.3,0.5", "seed=2", "--range", "x=0:0.5", "v=-0.1:0.1"]
+    options += ["--attractor", "moving=mean(v_1**2) > 0.001", "together=synchronous", "--bound", 10, "--json"]
     found = json.loads(printed(capsys, "basin", scene, *options))
-    assert len(found["error"]) == 5
+    assert np.shape(found["fate"]) == (2, 5)
+    assert found["attractor"][:2] == ["moving", "together"]
+    assert np.max(found["initial"]) <= 0.5
+    each = json.loads(printed(capsys, "basin", scene, "--samples", 2, "--nodes", "each", "--window", 1, "--json"))
+    assert np.shape(each["fate"]) == (2, 2)
     spectrum = json.loads(printed(capsys, "lyapunov", scene, "--periods", 4, "--count", 2, "--json"))
     assert len(spectrum["exponent"]) == 2
     out = printed(capsys, "orbit", scene, "--set", "omega=1.35", "-o", folder / "orbit.nc")
@@ -136,6 +141,8 @@ def test_wrong_uses_of_functions_are_said_in_a_line(folder: Path, capsys: pytest
         (("lyapunov", scene, "--count", 9), "count = 9; expected 1 … 4"),
         (("orbit", scene, "--follow", "nothing=1:2:3"), "expected a parameter and its values"),
         (("basin", scene, "--set", "nothing=1"), "unknown parameter 'nothing'"),
+        (("basin", scene, "--range", "x=1"), "--range: found 'x=1'; expected COMPONENT=LOW:HIGH"),
+        (("basin", scene, "--attractor", "rest"), "--attractor: found 'rest'; expected NAME=CONDITION"),
     ):
         assert message in refused(capsys, *words)
 

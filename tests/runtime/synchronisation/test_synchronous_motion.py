@@ -11,7 +11,6 @@ from synchain import Criterion, Field, Rates, Scene, basin, ends, thresholds, un
 from synchain.graphs import chain, from_matrix
 from synchain.runtime.support.execution import Execution
 from synchain.runtime.synchronisation.agreement import agreement
-from synchain.runtime.synchronisation.basin import Fate
 from synchain.runtime.synchronisation.criterion import AppliedCriterion
 from synchain.runtime.synchronisation.threshold import fitted, simulate
 
@@ -68,8 +67,9 @@ def test_verdicts_do_not_depend_on_units(units: tuple[float, float, float, float
     assert result.share.tolist() == [0.0, 1.0]
     box = {"x": (c - s, c + s), "v": (-r, r)}
     quick = basin(pair(*units), samples=8, ranges=box, show_progress=False, k=0.2 * pace)
-    assert quick.shares[Fate.SYNCHRONOUS] == 1.0
-    assert quick.tolerance == pytest.approx(quick.criterion.size / 1000)
+    assert quick.shares.sel(attractor="synchronous") == 1.0
+    assert quick.criterion is not None
+    assert quick.criterion.tolerance == pytest.approx(quick.criterion.size / 1000)
 
 
 def test_an_invisible_component_is_seen() -> None:
