@@ -96,6 +96,17 @@ class _Writer:
         """Return the place of a number of one of the first six groups."""
         return plus(Number(group * self.rows), row if isinstance(row, Expression) else Number(row))
 
+    def stored(
+        self, array: str, columns: Sequence[sp.Expr], places: Sequence[Expression]
+    ) -> tuple[set[sp.Symbol], list[Statement]]:
+        """Return the symbols of some expressions, and the statements that compute and store them."""
+        # numbers such as cosh(1) are stored as they are: in a register no other value tells their width
+        moving = [(k, e) for k, e in zip(places, columns, strict=True) if not e.is_number]
+        body = share([e for _, e in moving], self.names.fresh("z"))
+        stores = [store(array, k, lane(lower(e))) for (k, _), e in zip(moving, body.results, strict=True)]
+        stores += [store(array, k, lane(Number(float(e)))) for k, e in zip(places, columns, strict=True) if e.is_number]
+        return body.symbols, [*assigned(body), *stores]
+
     def behind(self, group: int, row: Expression | int) -> Expression:
         """Return the place of a number behind those on jumps in time: law, first row, K, impulse, correction, firing."""
         return self.place(SIDES + group, plus(row if isinstance(row, Expression) else Number(row), Number(2)))
@@ -119,13 +130,8 @@ class _WrittenOut(_Writer):
         ]
         sides = jump_sides(zeros)
         places += [Number(SIDES * self.rows + k) for k in range(len(sides))]
-        body = share([*columns, *sides], self.names.fresh("z"))
-        return [
-            *self.loads(body.symbols, "p"),
-            *parameter_loads(equations, body.symbols),
-            *assigned(body),
-            *(store("out", k, lane(lower(e))) for k, e in zip(places, body.results, strict=True)),
-        ]
+        used, stores = self.stored("out", [*columns, *sides], places)
+        return [*self.loads(used, "p"), *parameter_loads(equations, used), *stores]
 
     def strike(self) -> list[Statement]:
         equations, columns, places, loads, modes = self.equations, [], [], [], []
@@ -147,16 +153,8 @@ class _WrittenOut(_Writer):
                 store("y", k, Load("out", self.place(MODE, first + a)))
                 for k, a in zip(equations.places[i][size:], held, strict=True)
             ]
-        body = share(columns, self.names.fresh("z"))
-        stores = [store("y", k, lane(lower(e))) for k, e in zip(places, body.results, strict=True)]
-        return [
-            *self.loads(body.symbols, "y"),
-            *parameter_loads(equations, body.symbols),
-            *loads,
-            *assigned(body),
-            *stores,
-            *modes,
-        ]
+        used, stores = self.stored("y", columns, places)
+        return [*self.loads(used, "y"), *parameter_loads(equations, used), *loads, *stores, *modes]
 
     def parts(self) -> list[tuple[int, int, tuple[Row, ...]]]:
         """Return each node with its first row and its rows."""
@@ -219,10 +217,9 @@ class _Looped(_Writer):
             places += [self.place(group, self.row(number, a)) for group in (LEVEL, MODE, SPEED, RATE, RATIO)]
             columns += [sp.Integer(LAWS[row.law]), sp.Integer(a), *_full(node.rows, row)]
             places += [self.behind(group, self.row(number, a)) for group in range(2 + len(node.rows))]
-        body = share(columns, self.names.fresh("z"))
-        used |= body.symbols
-        loop: list[Statement] = [*self.states(node, body.symbols, "p"), *self.layout.own(body.symbols), *assigned(body)]
-        loop += [store("out", k, lane(lower(e))) for k, e in zip(places, body.results, strict=True)]
+        symbols, stores = self.stored("out", columns, places)
+        used |= symbols
+        loop = [*self.states(node, symbols, "p"), *self.layout.own(symbols), *stores]
         return [self.span_of(number).over(loop)]
 
     def of_link(self, joint: Joint, used: set[sp.Symbol]) -> list[Statement]:

@@ -38,6 +38,7 @@ from ..mechanics.impacts import EventDefinition, Friction, Reset, Stop
 from ..mechanics.lagrangian import check_masses_exist, mass_matrix
 from ..mechanics.oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel, Oscillator, Scaling
 from ..mechanics.parameter import Parameter, dimension
+from ..mechanics.sliding import sliding_surfaces
 from .loader import load_friction_law
 
 Expression: TypeAlias = "sp.Expr | float | str"
@@ -187,6 +188,7 @@ def Lagrangian(
 def Field(
     rates: Mapping[Any, Expression],
     *,
+    contact: str | None = None,
     events: Iterable[EventDefinition] = (),
     parameters: Keyed | None = None,
     initial: Keyed | None = None,
@@ -200,6 +202,9 @@ def Field(
     rates : mapping
         State -> rate, in the order of the states.  States are plain symbols, functions of time, or names.  Rates are
         expressions of SymPy, numbers, or texts, which are parsed, not run.
+    contact : str, optional
+        Treatment of jumps, "sign" (the default) or "set-valued".  With "set-valued" motion slides along the zeros of
+        the arguments of signs, where the rates on both sides push towards them (Filippov's convex rule).
     events : iterable of Reset, optional
         Jumps of states where a guard passes zero.
     parameters : mapping, optional
@@ -249,11 +254,18 @@ def Field(
         raise ValueError(f"{what}: found friction(…) in a rate; expected it in the forces of a Lagrangian")
     declared = _events(what, events, names, defaults, None)
     model = FieldModel(tuple(table), field_rates, declared)
+    treatment = ContactModel.SIGN if contact is None else ContactModel.parse("contact", contact)
+    if treatment is ContactModel.ATAN:
+        raise ValueError(f"{what}: found contact 'atan'; expected 'sign' or 'set-valued' for a field")
+    if treatment is ContactModel.SET_VALUED:
+        states = tuple(sp.Symbol(s, real=True) for s in table)
+        _try(what, lambda: sliding_surfaces(states, field_rates))
     return Oscillator(
         name,
         names.used_parameters(model.expressions),
         model,
         names.initial(initial),
+        contact=ContactModel.ATAN if contact is None else treatment,
         source=check_text("source", source, LONGEST_SOURCE),
     )
 

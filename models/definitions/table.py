@@ -21,7 +21,7 @@ from .inline import Field, Lagrangian, friction_law, link_energy
 from .loader import load_friction_law, load_oscillator, read_coupling
 
 _COMMON = ("name", "source", "parameters", "initial", "events")
-_FIELD = (*_COMMON, "rates")
+_FIELD = (*_COMMON, "rates", "contact")
 _LAGRANGIAN = (
     *_COMMON,
     "coordinates",
@@ -188,8 +188,8 @@ def _oscillator_table(node: Oscillator) -> dict[str, Any]:
         table |= _lagrangian_table(model, texts)
         if node.friction is not None:
             table["friction"] = as_name_or_table(node.friction)
-        if node.contact != ContactModel.ATAN:
-            table["contact"] = str(node.contact)
+    if node.contact != ContactModel.ATAN:
+        table["contact"] = str(node.contact)
     if model.events:
         table["events"] = [_event_table(event, texts) for event in model.events]
     table["parameters"] = _parameter_tables(node.parameters)

@@ -30,6 +30,7 @@ from ..mechanics.nondimensional import friction_coefficient, nondimensional, sca
 from ..mechanics.oscillator import FRICTION, FieldModel, LagrangianModel, Oscillator
 from ..mechanics.parameter import Parameter
 from ..mechanics.rows import Law, Surface, friction_surface, with_rows
+from ..mechanics.sliding import sliding_surfaces
 from .equations import Equations, Layer
 
 FEW = 8
@@ -81,7 +82,11 @@ def node(
     events = oscillator.model.events
     if isinstance(oscillator.model, FieldModel):
         state = tuple(sp.Symbol(name, real=True) for name in oscillator.model.state)
-        return _with_surfaces(state, oscillator.model.rates, _resets(events), {}, symbols)
+        rates, surfaces = oscillator.model.rates, _resets(events)
+        if contact == ContactModel.SET_VALUED and oscillator.has_contact:
+            rates, signs = sliding_surfaces(state, rates)
+            surfaces = [*signs, *surfaces]
+        return _with_surfaces(state, rates, surfaces, {}, symbols)
 
     # Solve M dv/dt = r in symbols. With too many coupled coordinates keep M, with identity rows for the coordinates.
     system = nondimensional(oscillator)

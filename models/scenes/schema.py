@@ -176,7 +176,7 @@ def _written_out() -> tuple[Table, Table]:
     ]
     common = {"name": TEXT, "source": CITATION, "parameters": anything, "initial": anything,
               "events": {"type": "array", "items": {"anyOf": events}}}  # fmt: skip
-    field = _table({**common, "rates": EXPRESSIONS}, "rates")
+    field = _table({**common, "rates": EXPRESSIONS, "contact": contact}, "rates")
     energies = {"coordinates": anything, "kinetic": NUMBER, "potential": NUMBER, "dissipation": NUMBER}
     more = {"forces": EXPRESSIONS, "friction": friction, "contact": contact, "scaling": anything}
     lagrangian = _table({**common, **energies, **more}, "coordinates", "kinetic")

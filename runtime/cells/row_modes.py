@@ -87,7 +87,7 @@ def _decide(
             best = _agreeing(np.array(rate), np.array(ratio), stiffness, stops, modes, free)
             if best is None:
                 raise ValueError(
-                    f"initial: found no motion of node {i + 1} that agrees with its contacts; change the start"
+                    f"initial: found no single motion of node {i + 1} that agrees with its contacts or surfaces; change the start"
                 )
             states[cell, list(places[size:])] = best
 
@@ -100,7 +100,8 @@ def _agreeing(
     modes: np.ndarray,
     free: Sequence[int],
 ) -> np.ndarray | None:
-    """Return the modes with most held rows that agree with the laws; None if there are none."""
+    """Return the modes with most held rows that agree with the laws; None if there are none, or no single ones."""
+    found = []
     options = itertools.product(*((0.0, 1.0) if stops[a] else (0.0, 1.0, -1.0) for a in free))
     for choice in sorted(options, key=lambda each: sum(map(abs, each))):
         tried = modes.copy()
@@ -115,8 +116,10 @@ def _agreeing(
         holds = np.where(stops, x >= 0.0, abs(x) <= ratio)
         leaves = np.where(stops, slope < 0.0, tried * slope > 0.0)
         if np.where(held, holds, leaves)[list(free)].all():
-            return tried
-    return None
+            found.append(tried)
+    # static friction above kinetic friction leaves a choice; without it several answers mean that none is determined
+    drops = any(ratio[a] > 1.0 for a in free if not stops[a])
+    return found[0] if len(found) == 1 or (found and drops) else None
 
 
 def _of_nodes(equations: Equations, node: Node, members: Sequence[int], values: Values, states: np.ndarray) -> Values:
