@@ -109,7 +109,7 @@ def test_refusals_and_files() -> None:
 def test_a_repelling_surface_has_no_single_motion() -> None:
     """On x = 0 of x' = sign(x) + 2 y motion may leave to both sides or stay; where 2|y| > 1 it crosses."""
     node = sc.Field({X: sp.sign(X) + 2 * Y, Y: -1}, contact="set-valued")
-    x, y, slip = end(scene(node, 1.0, "taylor", initial={"x": [-0.5], "y": [2.0]})).ravel()
+    x, _, slip = end(scene(node, 1.0, "taylor", initial={"x": [-0.5], "y": [2.0]})).ravel()
     crossing = (3 - np.sqrt(9 - 4 * 0.5)) / 2  # x = -1/2 + 3 t - t**2
     late = 1.0 - crossing
     assert [x, slip] == pytest.approx([late * (1 + 2 * (2 - crossing)) - late**2, 1.0], abs=1e-12)
