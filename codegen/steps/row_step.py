@@ -147,7 +147,7 @@ class _WrittenOut(_Writer):
             size = len(equations.node_at(i).continuous)
             after = _struck(rows, symbols[:size], numbers)
             columns += [e for e, s in zip(after, symbols, strict=False) if e != s]
-            places += [k for k, e, s in zip(equations.places[i], after, symbols, strict=False) if e != s]
+            places += [Number(k) for k, e, s in zip(equations.places[i], after, symbols, strict=False) if e != s]
             held = [a for a, row in enumerate(rows) if row.law is not Law.RESET]
             modes += [
                 store("y", k, Load("out", self.place(MODE, first + a)))
