@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -19,7 +19,7 @@ import sympy as sp
 
 from synchain.codegen.driver.columns import Control
 from synchain.models.dynamics.equations import Equations
-from synchain.models.mechanics.components import TIME
+from synchain.models.mechanics.components import TIME, Edge, Node
 
 from .averages import ROUNDING
 
@@ -122,28 +122,54 @@ class Turns(NamedTuple):
 def rates_of(equations: Equations, parameters: dict[str, float]) -> RateFunctions:
     """Return the rates of equations as functions of the state alone; with a mass matrix M, of M^-1 times the forces."""
     names = [sp.Symbol(name, real=True) for name in (*equations.state, *equations.parameters)]
-    values = [parameters[name] for name in equations.parameters]
-    rhs, mass = equations.rhs(), equations.mass()
-    places = tuple(np.array([*mass], dtype=int).reshape(-1, 2).T)
-    rates, sizes, masses = (
-        sp.lambdify(names, [e.xreplace({TIME: sp.S.Zero}) for e in part], "numpy")
-        for part in (rhs, map(_size, rhs), mass.values())
-    )
+    values = np.array([parameters[name] for name in equations.parameters], dtype=float)
+    rates, sizes = (_summed(equations, names, values, change) for change in (lambda e: e, _size))
+    mass = equations.mass()
+    if not mass:
+        return RateFunctions(rates, sizes)
+    masses, places = sp.lambdify(names, [*mass.values()], "numpy"), tuple(np.array([*mass]).T)
 
     def inverse(state: np.ndarray) -> np.ndarray:
         matrix = np.zeros((len(state), len(state)))
         matrix[places] = masses(*state, *values)
         return np.linalg.inv(matrix)
 
-    def solved(state: np.ndarray) -> np.ndarray:
-        forces = np.array(rates(*state, *values), dtype=float)
-        return inverse(state) @ forces if mass else forces
+    return RateFunctions(
+        lambda state: inverse(state) @ rates(state), lambda state: np.abs(inverse(state)) @ sizes(state)
+    )
 
-    def solved_sizes(state: np.ndarray) -> np.ndarray:
-        forces = np.array(sizes(*state, *values), dtype=float)
-        return np.abs(inverse(state)) @ forces if mass else forces
 
-    return RateFunctions(solved, solved_sizes)
+def _summed(
+    equations: Equations, names: list[sp.Symbol], values: np.ndarray, change: Callable[[sp.Expr], sp.Expr]
+) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the sum of nodes and links at time 0 as a function of the state; `change` changes their expressions.
+
+    Each template is compiled once, and evaluated for all its nodes or links together.
+    """
+    # a column for each state, parameter and number (the weights of links)
+    columns: dict[sp.Expr, int] = {s: k for k, s in enumerate(names)}
+    uses: dict[Node | Edge, list[tuple[Sequence[int], dict[sp.Symbol, sp.Expr]]]] = {}
+    for i, places in enumerate(equations.places):
+        uses.setdefault(equations.node_at(i), []).append((places, equations.at_node(i)))
+    for link, edge in equations.linked():
+        uses.setdefault(edge, []).append((equations.places[link[0]], equations.at_link(link, edge)))
+    parts = []
+    for template, each in uses.items():
+        rates = [change(e).xreplace({TIME: sp.S.Zero}) for e in template.rhs]
+        symbols = sorted({s for e in rates for s in e.free_symbols}, key=lambda s: s.name)
+        chosen = [[columns.setdefault(at.get(s, s), len(columns)) for _, at in each] for s in symbols]
+        arguments = [np.array(row) if len(row) > 1 else row[0] for row in chosen]
+        parts.append((sp.lambdify(symbols, rates, "numpy"), arguments, np.array([places for places, _ in each])))
+    numbers = np.array([*values, *map(float, [*columns][len(names) :])])
+
+    def total(state: np.ndarray) -> np.ndarray:
+        known, result = np.concatenate([state, numbers]), np.zeros(len(state))
+        for function, arguments, rows in parts:
+            for row, rate in zip(rows.T, function(*(known[a] for a in arguments)), strict=True):
+                np.add.at(result, row, rate)
+        return result
+
+    return total
 
 
 def _size(e: sp.Expr) -> sp.Expr:

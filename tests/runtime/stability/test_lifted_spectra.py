@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -9,6 +11,7 @@ from pendula import ByHand, pendulum
 
 import synchain as sc
 from synchain.runtime.stability.lifted_integrator import LiftedIntegrator
+from synchain.runtime.stability.motion import rates_of
 from synchain.runtime.stability.tangent_frame import TangentFrame
 
 B, KAPPA = sp.symbols("b kap")
@@ -126,6 +129,36 @@ def test_nine_friction_oscillators_take_a_stiff_method() -> None:
     assert frame.integrator.steps < 10_000
     assert least.min() > 0.1
     assert not lost.any()
+
+
+def of_kinds() -> sc.Scene:
+    fast = {"oscillator": sc.Field({"x": "-3*x*cos(x)"}), "at": [1]}
+    slow = {"oscillator": sc.Field({"x": "w", "w": "-x - w/5"}), "at": [2, 3]}
+    return sc.Scene(nodes=[fast, slow], coupling="x->x", topology=sc.graphs.chain(3), parameters={"sigma": 0.5})
+
+
+def of_link_numbers() -> sc.Scene:
+    phase, link = sc.Field({"th": "om"}, parameters={"om": 0.0}), sc.Rates({"th": "K*W*sin(th_j - th_i)"}, {"K": 2})
+    numbers = {"om": [0.1, 0.2, 0.3], "K": [1.0, 2.0, 3.0, 4.0]}
+    return sc.Scene(phase, link, sc.graphs.chain(3), parameters=numbers)
+
+
+@pytest.mark.parametrize("make", [of_kinds, of_link_numbers, lambda: stuart_landau(5)])
+def test_rates_by_templates_are_those_of_the_network(make: Callable[[], sc.Scene]) -> None:
+    scene = make()
+    equations = scene.equations
+    state = np.random.default_rng(5).normal(size=len(scene.y0))
+    known = dict(zip(equations.state, state, strict=True)) | dict(scene.parameters)
+    exact = [e.xreplace({s: sp.Float(known[s.name]) for s in e.free_symbols}) for e in equations.rhs()]
+    rates = rates_of(equations, dict(scene.parameters))
+    np.testing.assert_allclose(rates.values(state), np.array(exact, dtype=float), rtol=1e-13)
+    assert np.all(rates.sizes(state) >= np.abs(rates.values(state)) * (1 - 1e-13))
+
+
+def test_rates_of_a_mass_matrix_are_those_by_hand() -> None:
+    state = np.random.default_rng(6).normal(size=8)
+    rates = rates_of(sc.Scene(pendulum(4), None).equations, {"gravity": 1.0, "delta": 0.3})
+    np.testing.assert_allclose(rates.values(state), ByHand(4, 1.0, 0.3).rates(0.0, state), rtol=1e-11)
 
 
 def test_what_is_refused() -> None:
