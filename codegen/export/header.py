@@ -28,6 +28,7 @@ class Exported:
         """Rename symbols; raise ValueError for unsuitable values, and for masses that the language cannot handle."""
         checked = _checked(equations, values)
         model, changed = portable(equations)
+        model.expect_pairs(f"export to {language}")
         check_inertia(model, language)
         numbers = dict(zip(model.parameters, checked.values(), strict=bool(checked)))
 

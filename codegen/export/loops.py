@@ -148,8 +148,8 @@ def _links(equations: Equations, reads: bool) -> Iterator[Site]:
     """Yield one site for each link, or a single site for the loop over links."""
     names = equations.parameters
     if is_unrolled(equations):
-        for link, edge in equations.linked():
-            target, source, _ = link
+        for (target, source, weight, *_), edge in equations.linked():
+            link = target, source, weight
             here, there = (_literal(equations.places[end]) for end in (target, source))
             # parameters that differ between nodes or links: of the target, of the source, of the link
             slots = node_parameters(equations, target)
@@ -196,7 +196,7 @@ def _parameters(
 ) -> list[Statement]:
     """Return statements that read the parameters of the whole network that are used from `numbers`."""
     nodes = {kind: i for i, kind in enumerate(equations.kind_of)}.values()
-    links = {edge: (link, edge) for link, edge in equations.linked()}.values()
+    links = {edge: ((link[0], link[1], link[2]), edge) for link, edge in equations.linked()}.values()
     tables = [table(equations, i) for table in (of_node, node_mass) for i in nodes]
     tables += [table(equations, link) for table in (of_link, link_mass) for link in links]
     used = {s for table in tables for e in table.values() for s in sp.sympify(e).free_symbols}

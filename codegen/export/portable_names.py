@@ -56,7 +56,7 @@ def portable(equations: Equations) -> tuple[Equations, dict[str, str]]:
                 if shared[s].name != s.name:
                     changed[s.name] = shared[s].name
         swap = {s: shared[s] for s in edge.parameters}
-        for s in (*edge.here, *edge.there):
+        for s in (s for end in edge.end_states for s in end):
             swap[s] = _renamed(s, taken, s.name in taken)
             taken.add(swap[s].name)
         swap[edge.weight] = real("weight_")

@@ -211,6 +211,11 @@ def _planned(equations: Equations, method: Integrator, unroll: int, fill: float)
         return equations, None
     if method.inexact:
         raise ValueError(f"integrator {method.name}: steps at most {unroll} nodes, found {equations.n}; use rodas5p")
+    if method.implicit and equations.triadic:
+        raise ValueError(
+            f"integrator {method.name}: found links of three ends between {equations.n} nodes; expected at most {unroll} nodes; "
+            "use dop853 or taylor"
+        )
     if method.implicit and any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
         raise ValueError(
             f"integrator {method.name}: found a mean field of {equations.n} nodes, whose Jacobian has an entry for each pair; "

@@ -45,7 +45,7 @@ from ..program.statements import (
 from .blocks import NodeBlocks
 from .fields import LinkSums, link_sums, mean_fields
 from .mass_solve import added_masses, momentum_slopes, turned_masses
-from .places import Joint, NodeKindLayout, StateLayout, add_to, link_ends, load_from, named, span, store_in
+from .places import Joint, NodeKindLayout, StateLayout, add_to, load_from, named, span, store_in
 from .safe_names import NAMES
 from .sparse_plan import SparsePlan, block_pattern
 from .step import NOW, StepWriter, lane, linearised
@@ -170,9 +170,10 @@ class LoopedStep(StepWriter):
     def link(self, joint: Joint, base: str, used: Sequence[sp.Expr], states: bool = True) -> list[Statement]:
         """Load ends and weight of a link, the parameters in `used`, and with `states` the states of both ends."""
         read, symbols = self.places.read, {s for e in used for s in e.free_symbols}
-        loads = [*link_ends(joint.edge, joint.edge.weight.name), *self.places.of_link(joint.edge, symbols)]
+        loads = [*self.places.ends(joint.edge, joint.edge.weight.name), *self.places.of_link(joint.edge, symbols)]
         if states:
             loads += read(joint.target, base, "_here", "i") + read(joint.source, base, "_there", "j")
+            loads += read(joint.source, base, "_beyond", "k_beyond") if joint.edge.beyond else []
         return loads
 
     # -- linearisation ----------------------------------------------------------------------------------------

@@ -6,7 +6,8 @@ links of one template. The integer array `where` holds at
 
     c*NODES + i             the index of state c of node i in the whole state,
     (size + k)*NODES + i    the slot, for node i, of the k-th parameter that differs between nodes,
-    behind + k*LINKS + e    the slot, for link e, of the k-th parameter that differs between links;
+    behind + k*LINKS + e    the slot, for link e, of the k-th parameter that differs between links,
+    second + e              the second source of link e, if links have three ends;
 
 `size` is the largest number of states of a node, and -1 stands for a missing state or parameter. With one kind of
 nodes, `where` holds the rows of links only (behind = 0).
@@ -25,7 +26,7 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 from synchain.models.dynamics.angles import periods_of_kinds
-from synchain.models.dynamics.equations import Equations, Layer
+from synchain.models.dynamics.equations import Equations, Layer, Triad
 from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import Edge, Node
 
@@ -96,6 +97,7 @@ class StateLayout:
         self.varied, self.numbered = equations.varied, tuple(equations.numbered)
         self.links = sum(len(layer.links) for layer in equations.listed)
         self.behind = (self.size + len(self.varied)) * equations.n if self.mixed else 0
+        self.second = self.behind + len(self.numbered) * self.links
         self.slots = {name: slot for slot, name in enumerate(equations.parameters, start=equations.dimension)}
 
         def ranges(index: str, stop: str, counts: Sequence[int]) -> list[Span]:
@@ -155,6 +157,11 @@ class StateLayout:
             return self.place(self.size + number, index)
         return Number(self.slots[f"{self.varied[number]}_1"]) + index
 
+    def ends(self, edge: Edge, weight: str, source: str = "j") -> list[Statement]:
+        """Load the ends of link e and its weight; the second source of a link of three ends is node `k_beyond`."""
+        loads = link_ends(edge, weight, source)
+        return [*loads, whole("k_beyond", Load("where", self.second + Name("e"), None))] if edge.beyond else loads
+
     def own(self, used: Container[sp.Symbol]) -> list[Assign]:
         """Load those parameters in `used` that differ from node to node, for node i."""
         loads = ((name, Load("p", self._parameter(k, "i"))) for k, name in enumerate(self.varied))
@@ -184,7 +191,8 @@ def link_ends(edge: Edge, weight: str, source: str = "j") -> list[Statement]:
 
 def named(joint: Joint) -> dict[sp.Symbol, sp.Symbol]:
     """Return the map from states at both ends of a link, and parameters of the source, to their names in the loop."""
-    ends = ((joint.edge.here, joint.target, "_here"), (joint.edge.there, joint.source, "_there"))
+    ends = [(joint.edge.here, joint.target, "_here"), (joint.edge.there, joint.source, "_there")]
+    ends += [(joint.edge.beyond, joint.source, "_beyond")] if joint.edge.beyond else []
     states = {
         s: real(f"{state.name}{suffix}")
         for symbols, node, suffix in ends
@@ -219,13 +227,13 @@ def by_kind(equations: Equations) -> list[int]:
     return sorted(range(equations.n), key=equations.kind_of.__getitem__)
 
 
-def by_joint(equations: Equations) -> list[tuple[Link, Layer]]:
+def by_joint(equations: Equations) -> list[tuple[Link | Triad, Layer]]:
     """Return the listed links and their layers in a kernel's order: joint after joint, then by rank at the target.
 
     Consecutive links then add to different nodes, so that no addition waits for the previous one.
     """
     ranks, ordered = Counter[tuple[int, int]](), []
-    pairs = ((link, layer) for layer in equations.listed for link in layer.links)
+    pairs = ((link, layer) for layer in equations.listed for link in layer.each())
     for number, (link, layer) in zip(joint_numbers(equations), pairs, strict=True):
         ordered.append((number, ranks[number, link[0]], link, layer))
         ranks[number, link[0]] += 1
@@ -247,10 +255,12 @@ def where_table(equations: Equations) -> np.ndarray:
             table[size:, number] = [slots.get(f"{name}_{i + 1}", -1) for name in equations.varied]
         of_nodes = [table.reshape(-1)]
     # rows of links: slots of parameters, in the order of a kernel
-    links = by_joint(equations) if equations.numbered else []
+    links = by_joint(equations) if equations.numbered or equations.triadic else []
     of_links = [
-        slots[layer.name(name, link)] if name in layer.varied else -1
+        slots[layer.name(name, (link[0], link[1], link[2]))] if name in layer.varied else -1
         for name in equations.numbered
         for link, layer in links
     ]
+    if equations.triadic:
+        of_links += [link[3] if len(link) == 4 else -1 for link, _ in links]
     return np.concatenate([*of_nodes, np.array(of_links, np.int64)])

@@ -42,8 +42,8 @@ PREFIXES = (
 )  # fmt: skip
 """Prefixes of names that steps form from names of states: k2_x_1, u_x_1, j_vx_1, …"""
 
-SUFFIXES = ("_here", "_there", "_first")
-"""Suffixes of states at the target and at the source of a link, and at the first node."""
+SUFFIXES = ("_here", "_there", "_beyond", "_first")
+"""Suffixes of states at the target and at the sources of a link, and at the first node."""
 
 NUMBERED = re.compile(r"_\d+$")
 """Matches a suffix that numbers a node: x_1 is the state x of the first node."""
@@ -56,7 +56,7 @@ def tidy(equations: Equations) -> Equations:
     of_nodes = states | {s for node in nodes for s in node.parameters}
     weights = {edge.weight for edge in edges}
     shown = of_nodes | weights | {s for edge in edges for s in edge.parameters}
-    taken = {s.name for s in shown} | {s.name for edge in edges for s in (*edge.here, *edge.there)}
+    taken = {s.name for s in shown} | {s.name for edge in edges for end in edge.end_states for s in end}
     swap: dict[sp.Symbol, sp.Symbol] = {}
     for s in sorted(shown, key=str):
         # a user's symbol x_1 would clash with state x of the first node

@@ -101,7 +101,7 @@ def sparse_plan(equations: Equations, fill: float = FILL_LIMIT, solves: bool = T
         max(len(node.state) for node in equations.nodes),
         tuple((pattern, equations.kind_of.count(k)) for k, pattern in enumerate(of_nodes)),
         tuple((patterns, joints.count(k)) for k, patterns in enumerate(of_links)),
-        tuple((numbers[target], numbers[source], weight) for (target, source, weight), _ in by_joint(equations)),
+        tuple((numbers[link[0]], numbers[link[1]], link[2]) for link, _ in by_joint(equations)),
         equations.mixed,
         tuple(where_table(equations).tolist()),
     )

@@ -385,7 +385,8 @@ class LoopedSeries(TaylorStepWriter):
         """Return the rates of links, hoisted like those of nodes if they contain time; symbols in `more` move too."""
         if not edge.forced:
             return Hoisted(list(rates))
-        moving = (edge.weight, *edge.here, *edge.there, *(s for s, _ in edge.theirs), *self.varied, *more)
+        states = (s for end in edge.end_states for s in end)
+        moving = (edge.weight, *states, *(s for s, _ in edge.theirs), *self.varied, *more)
         return self.hoisted(rates, moving)
 
     @staticmethod
@@ -433,9 +434,11 @@ class LoopedSeries(TaylorStepWriter):
         """Return the section that adds the contributions of a joint's links to the rates."""
         edge, used = joint.edge, symbols_in(hoisted.rates)
         section = SeriesLoop(SeriesGraph(self.names), self.order, span=joint.span, count=self.layout.links, adds=True)
-        section.setting += link_ends(edge, self.called[edge.weight.name], "j_there")
+        section.setting += self.layout.ends(edge, self.called[edge.weight.name], "j_there")
         self.read_states(section, edge.here, joint.target, ("_here", "i"), used)
         self.read_states(section, edge.there, joint.source, ("_there", "j_there"), used)
+        if edge.beyond:
+            self.read_states(section, edge.beyond, joint.source, ("_beyond", "k_beyond"), used)
         section.setting += self.loaded(self.layout.of_link(edge, used, "j_there"))
         section.fixed |= theirs(edge)
         self.store(section, joint.target, self.read(section, hoisted))

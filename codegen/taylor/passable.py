@@ -89,7 +89,7 @@ def is_analytic(equations: Equations) -> bool:
 def is_linear(equations: Equations) -> bool:
     """Return True if the rates are sums of states with constant coefficients and of terms of time."""
     parts = [(node.rhs, node.state) for node in equations.nodes]
-    parts += [(edge.rhs, (*edge.here, *edge.there)) for edge in equations.edges]
+    parts += [(edge.rhs, tuple(s for end in edge.end_states for s in end)) for edge in equations.edges]
     # `any` stops at the first slope that depends on a state; differentiating all rates of a large node takes seconds
     moving_slopes = (
         derivative(e, s).free_symbols & {TIME, *states} for rates, states in parts for e in rates for s in states
@@ -102,7 +102,7 @@ def _templates(equations: Equations) -> Iterator[tuple[Sequence[sp.Expr], Ends, 
     for node in equations.nodes:
         yield (*node.rhs, *(e for row in node.inertia for e in row)), (node.state,), {TIME, *node.state}
     for edge in equations.edges:
-        yield edge.expressions, (edge.here, edge.there), {TIME, *edge.here, *edge.there}
+        yield edge.expressions, edge.end_states, {TIME, *(s for end in edge.end_states for s in end)}
 
 
 def _obstacles(equations: Equations) -> dict[sp.Expr, str]:

@@ -214,7 +214,10 @@ class UnrolledSeries(TaylorStepWriter):
         """Yield the series that each node and each link contributes, with (node,) or (target, source)."""
         eq, shared = self.equations, self.supply.fresh("shared_")
         nodes = [Template.of(of_node(node), (*time, *node.state), shared) for node in eq.nodes]
-        edges = {edge: Template.of(of_edge(edge), (*time, *edge.here, *edge.there), shared) for edge in eq.edges}
+        edges = {
+            edge: Template.of(of_edge(edge), (*time, *(s for end in edge.end_states for s in end)), shared)
+            for edge in eq.edges
+        }
         for i, kind in enumerate(eq.kind_of):
             yield (i,), self.graph.read(nodes[kind], *self.symbols(time, eq.at_node(i)))
         for link, edge in eq.linked():

@@ -28,7 +28,8 @@ def periods_of_kinds(equations: Equations) -> tuple[Periods, ...]:
     # For each kind of node: expressions that contain its states, and the symbols of the states in these expressions.
     uses = [(kind, node.expressions, node.state) for kind, node in enumerate(equations.nodes)]
     for (target, source), edge in equations.edge_of:
-        uses += [(target, edge.expressions, edge.here), (source, edge.expressions, edge.there)]
+        uses += [(target, edge.expressions, edge.here)]
+        uses += [(source, edge.expressions, states) for states in edge.end_states[1:]]
 
     # For each state: periods of the waves that contain it, in units of pi; `bare`: states that occur outside of waves.
     bare = [set[int]() for _ in equations.nodes]

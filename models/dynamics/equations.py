@@ -10,6 +10,7 @@ import hashlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property
 from itertools import chain, compress, count
 
@@ -27,6 +28,9 @@ Ends = tuple[int, int]
 """The kinds of a link's target and source."""
 
 Entry = tuple[tuple[int, int], sp.Expr]
+
+Triad = tuple[int, int, Fraction, int]
+"""Target, source, weight and second source of a link of three ends."""
 
 DIGEST_LIMIT = 10_000
 """Most links of a complete graph that a digest lists one by one (a choice).
@@ -49,6 +53,11 @@ class Layer:
     links: Links
     varied: tuple[str, ...] = ()  # parameters with a value for each link: k_1_2 for the link from node 2 to node 1
     mutual: bool = False  # True if the links i -> j and j -> i share the values of `varied`
+    beyond: tuple[int, ...] = ()  # the second source (0-based) of each link of three ends; empty for links of two ends
+
+    def each(self) -> Iterator[Link | Triad]:
+        """Yield each link; the second source of a link of three ends follows the weight."""
+        yield from (zip_links(self.links, self.beyond) if self.beyond else self.links)
 
     def map(self, change: Callable[[Edge], Edge], renamed: Mapping[sp.Symbol, sp.Symbol] | None = None) -> Layer:
         """Return the same links with changed templates; drop names of `varied` that no template has any more."""
@@ -162,18 +171,18 @@ class Equations(_Cached, HasLatex):
         """The templates that links use."""
         return tuple(edge for _, edge in self.edge_of)
 
-    def linked(self) -> Iterator[tuple[Link, Edge]]:
+    def linked(self) -> Iterator[tuple[Link | Triad, Edge]]:
         """Yield each link with its template, layer by layer."""
         for layer in self.layers:
             templates = dict(layer.edge_of)
-            for link in layer.links:
+            for link in layer.each():
                 yield link, templates[self.ends(link)]
 
     def node_at(self, i: int) -> Node:
         """Return the template of node `i` (0-based)."""
         return self.nodes[self.kind_of[i]]
 
-    def ends(self, link: Link) -> Ends:
+    def ends(self, link: Link | Triad) -> Ends:
         """Return the kinds of the target and the source of a link."""
         return self.kind_of[link[0]], self.kind_of[link[1]]
 
@@ -211,6 +220,41 @@ class Equations(_Cached, HasLatex):
         if problem is not None:
             expected = "links of one layer" if problem.endswith("layers of links") else "links that have no inertia"
             raise ValueError(f"{what}: found {problem}; expected equal nodes with {expected}")
+
+    def expect_pairs(self, what: str) -> None:
+        """Raise ValueError for links of three ends; the message begins with `what`."""
+        if self.triadic:
+            raise ValueError(f"{what}: found links of three ends; expected links of two")
+
+    @cached_property
+    def triadic(self) -> bool:
+        """True if links have three ends."""
+        return any(edge.beyond for edge in self.edges)
+
+    @cached_property
+    def projected(self) -> Equations:
+        """The network with links of two ends that has the same synchronous motion, and the same deviations from it.
+
+        A link of three ends h(x_i, x_j, x_k) becomes h(x_i, x_j, x_j), and the weights of all second sources are added.
+        Between equal states, D2 h + D3 h is the derivative by the source of the new link.
+
+        References
+        ----------
+        Gambuzza et al., Nat. Commun. 12, 1255 (2021): generalised Laplacians.
+        """
+        if not self.triadic:
+            return self
+        layers = []
+        for layer in self.layers:
+            if layer.beyond:
+                weights: dict[tuple[int, int], Fraction] = {}
+                for target, source, weight in layer.links:
+                    weights[target, source] = weights.get((target, source), Fraction(0)) + weight
+                links = tuple((*pair, weight) for pair, weight in sorted(weights.items()) if weight)
+                edge_of = tuple((ends, _of_two_ends(edge)) for ends, edge in layer.edge_of)
+                layer = replace(layer, edge_of=edge_of, links=links, beyond=())
+            layers.append(layer)
+        return replace(self, layers=tuple(layers))
 
     def expect_exact_links(self, what: str) -> None:
         """Raise ValueError if a parameter differs from link to link; the message begins with `what`."""
@@ -337,17 +381,19 @@ class Equations(_Cached, HasLatex):
         states = dict(zip(node.state, self.symbols(i), strict=True))
         return states | {s: _numbered(s, i) for s in node.parameters if s.name in self.varied}
 
-    def at_link(self, link: Link, edge: Edge) -> dict[sp.Symbol, sp.Expr]:
+    def at_link(self, link: Link | Triad, edge: Edge) -> dict[sp.Symbol, sp.Expr]:
         """Return the substitution that turns an edge template into one link."""
-        target, source, weight = link
+        target, source, weight, *second = link
         values: dict[sp.Symbol, sp.Expr] = {edge.weight: sp.Rational(weight.numerator, weight.denominator)}
         values |= zip(edge.here, self.symbols(target), strict=True)
         values |= zip(edge.there, self.symbols(source), strict=True)
+        if edge.beyond:
+            values |= zip(edge.beyond, self.symbols(second[0]), strict=True)
         for s in edge.parameters:
             if s.name in self.varied:
                 values[s] = _numbered(s, target)
             if s.name in self.numbered:
-                values[s] = sp.Symbol(self.numbered[s.name].name(s.name, link), real=True)
+                values[s] = sp.Symbol(self.numbered[s.name].name(s.name, (target, source, weight)), real=True)
         return values | {s: _numbered(parameter, source) for s, parameter in edge.theirs}
 
     def events_at(self, i: int) -> tuple[Event, ...]:
@@ -425,12 +471,14 @@ class Equations(_Cached, HasLatex):
     def link_jacobian(self) -> Iterator[Entry]:
         """Yield ((row, column), entry) for the term of each link in the Jacobian; keys repeat."""
         places = self.places
-        blocks = {edge: (edge.jacobian_here(), edge.jacobian_there()) for edge in self.edges}
+        blocks = {edge: (edge.jacobian_here(), edge.jacobian_there(), edge.jacobian_beyond()) for edge in self.edges}
         for link, edge in self.linked():
-            here, there = blocks[edge]
+            here, there, beyond = blocks[edge]
             values = self.at_link(link, edge)
             yield from _block(here, places[link[0]], places[link[0]], values)
             yield from _block(there, places[link[0]], places[link[1]], values)
+            for k in link[3:]:
+                yield from _block(beyond, places[link[0]], places[k], values)
 
     def time_derivative(self) -> tuple[sp.Expr, ...]:
         """Return the partial derivative of the right-hand side with respect to time, in state order."""
@@ -468,7 +516,23 @@ class Equations(_Cached, HasLatex):
             parts.append(_text((*edge.here, *edge.there, edge.weight), edge.rhs, edge.parameters))
             parts += [sp.srepr(sp.Matrix(block)) for block in edge.inertia]
             parts += [f"theirs {edge.theirs}"] if edge.theirs else []
+            parts += [f"beyond {edge.beyond}"] if edge.beyond else []
+        parts += [f"second sources {layer.beyond}" for layer in self.layers if layer.beyond]
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def zip_links(links: Links, beyond: tuple[int, ...]) -> Iterator[Triad]:
+    """Yield links of three ends: target, source, weight, second source."""
+    return ((*link, k) for link, k in zip(links, beyond, strict=True))
+
+
+def _of_two_ends(edge: Edge) -> Edge:
+    """Return a link of three ends with equal sources as a link of two ends."""
+    swap = dict(zip(edge.beyond, edge.there, strict=True))
+    # The weights of all second sources are added, so that the link must be proportional to them.
+    if any(sp.simplify(e - edge.weight * e.xreplace({edge.weight: sp.S.One})) != 0 for e in edge.rhs):
+        raise ValueError("a link of three ends is not proportional to its weight; expected the weight as a factor")
+    return replace(edge, rhs=tuple(e.xreplace(swap) for e in edge.rhs), beyond=())
 
 
 def _renamed(names: Iterable[str], renamed: Mapping[sp.Symbol, sp.Symbol] | None) -> Iterator[str]:
@@ -536,6 +600,8 @@ def _check_friction(eq: Equations) -> None:
 
 def _check_links(eq: Equations) -> None:
     """Raise ValueError for templates that do not fit their nodes, and for links between nodes that do not exist."""
+    if eq.triadic:
+        _check_triads(eq)
     for (target, source), edge in (pair for layer in eq.layers for pair in layer.edge_of):
         for end, symbols in ((target, edge.here), (source, edge.there)):
             states = len(eq.nodes[end].state)
@@ -554,14 +620,31 @@ def _check_links(eq: Equations) -> None:
             )
     for layer in eq.listed:
         seen = set()
-        for target, source, _ in layer.links:
-            if not (0 <= target < eq.n and 0 <= source < eq.n) or target == source:
-                raise ValueError(f"link {target} <- {source}: expected two different nodes of 0 … {eq.n - 1}")
-            if (target, source) in seen:
+        if any(bool(edge.beyond) != bool(layer.beyond) for _, edge in layer.edge_of):
+            raise ValueError("links of three ends: found a template of two ends, or a list without second sources")
+        for target, source, _, *second in layer.each():
+            nodes = (target, source, *second)
+            if not all(0 <= i < eq.n for i in nodes) or len(set(nodes)) < len(nodes):
+                raise ValueError(f"link {target} <- {source}: expected different nodes of 0 … {eq.n - 1}")
+            if nodes in seen:
                 raise ValueError(f"link {target} <- {source} occurs twice; add the weights up")
-            seen.add((target, source))
+            seen.add(nodes)
         if {eq.ends(link) for link in layer.links} - {ends for ends, _ in layer.edge_of}:
             raise ValueError(f"{len(layer.links)} links but no edge equations; give a coupling")
+
+
+def _check_triads(eq: Equations) -> None:
+    """Raise ValueError for networks in which links of three ends are not supported."""
+    edges = [edge for edge in eq.edges if edge.beyond]
+    problems = {
+        "nodes of several kinds": eq.mixed,
+        "links with inertia": any(edge.inertia for edge in edges),
+        "set-valued friction": eq.sticks,
+        "parameters of a source that differ from node to node": any(edge.theirs for edge in edges),
+    }
+    problem = next((text for text, holds in problems.items() if holds), None)
+    if problem is not None:
+        raise ValueError(f"links of three ends: found {problem}; expected none of these")
 
 
 def _check_numbered(eq: Equations) -> None:

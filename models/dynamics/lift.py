@@ -63,13 +63,14 @@ def lifted(equations: Equations, names: Iterable[str] = ()) -> Lift:
         return Node((*each.state, *states), rates, (*each.parameters, *seeds), inertia=inertia)
 
     def edge(each: Edge) -> Edge:
-        here, there, parameters = deviations(each.here), deviations(each.there), seeded(each.parameters)
+        here, there, beyond = (deviations(states) for states in (each.here, each.there, each.beyond))
+        parameters = seeded(each.parameters)
         seeds = deviations(parameters, "seed")
         # A parameter of the source has a symbol of the link's; its seed as well.
         theirs = tuple((s, of) for s, of in each.theirs if of.name in bases.values())
         source_seeds = deviations((s for s, _ in theirs), "seed")
         along = (
-            *zip((*each.here, *each.there), (*here, *there), strict=True),
+            *zip((*each.here, *each.there, *each.beyond), (*here, *there, *beyond), strict=True),
             *zip(parameters, seeds, strict=True),
             *zip((s for s, _ in theirs), source_seeds, strict=True),
         )
@@ -77,6 +78,7 @@ def lifted(equations: Equations, names: Iterable[str] = ()) -> Lift:
             each,
             here=(*each.here, *here),
             there=(*each.there, *there),
+            beyond=(*each.beyond, *beyond),
             rhs=(*each.rhs, *_changes(each.rhs, along)),
             parameters=(*each.parameters, *seeds),
             inertia=tuple(_lower_triangular(block, along) for block in each.inertia),

@@ -14,6 +14,7 @@ from functools import lru_cache
 import sympy as sp
 
 from ..definitions.definition import FRICTION_LAW
+from ..graphs.hypergraph import Hypergraph
 from ..graphs.links import LINK_LIMIT, AllPairs, Link
 from ..graphs.topology import Topology
 from ..inputs.plugins import names
@@ -246,6 +247,8 @@ def _layer(
     Each link has a value of the parameters in `numbered`.  `mutual`: both directions of a link share these values.
     """
     shared = link.with_shared(apart.varied)
+    if link.beyond or isinstance(graph, Hypergraph):
+        return _triadic_layer(shared, graph, numbered)
     if numbered:
         return _listed_layer((((0, 0), shared),), graph, numbered, mutual)
     # A complete graph of one weight becomes a mean field if the link separates, else a list, if not too long.
@@ -258,6 +261,22 @@ def _layer(
             f"functions of the target times functions of the source, or at most {LINK_LIMIT} links, which can be listed"
         )
     return Layer((((0, 0), shared),), oriented_links(graph) if graph.link_count and link.oriented else graph.links)
+
+
+def _triadic_layer(link: Edge, graph: Topology, numbered: tuple[str, ...]) -> Layer:
+    """Return the links of three ends of a hypergraph between equal nodes."""
+    if not link.beyond or not isinstance(graph, Hypergraph):
+        found, expected = ("a graph of pairs", "triangles") if link.beyond else ("a hypergraph", "a graph of pairs")
+        ends = "three" if link.beyond else "two"
+        raise ValueError(
+            f"links of {ends} ends: found {found}, {graph.name}({graph.n}); expected {expected}; give each coupling its own "
+            "graph, links=[(coupling, graph), …]"
+        )
+    if numbered:
+        raise ValueError(f"links of three ends: found numbers of links, {', '.join(numbered)}; expected weights alone")
+    triads = graph.triads
+    links = tuple((target, source, weight) for target, source, weight, _ in triads)
+    return Layer((((0, 0), link),), links, beyond=tuple(k for *_, k in triads))
 
 
 def _listed_layer(
@@ -291,6 +310,8 @@ def layered_network(
     for coupling, graph in layers:
         numbered = tuple(name for name in of_links if name in coupling.parameters or name == WEIGHT_NUMBER.name)
         mutual = isinstance(coupling, LagrangianCoupling | Potential)
+        if apart.mixed and isinstance(graph, Hypergraph):
+            raise ValueError("links of three ends: found nodes of several kinds; expected equal nodes")
         if apart.mixed:
             linked.append(_mixed_layer(apart, oscillators, coupling, graph, numbered, mutual))
         else:

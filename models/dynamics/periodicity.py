@@ -164,7 +164,8 @@ def _local(template: Node | Edge) -> set[sp.Symbol]:
     """Return the symbols of a template that are not constant over a network: states, weights, source parameters."""
     if isinstance(template, Node):
         return set(template.state)
-    return {*template.here, *template.there, template.weight, *(s for s, _ in template.theirs)}
+    states = {s for end in template.end_states for s in end}
+    return {*states, template.weight, *(s for s, _ in template.theirs)}
 
 
 def _without_waves(e: sp.Expr, states: set[sp.Symbol], frequencies: set[sp.Expr]) -> sp.Expr:

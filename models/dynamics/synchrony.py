@@ -23,6 +23,7 @@ def synchronous_node(equations: Equations) -> Node:
     Links that vanish between equal states add nothing.  Other links add k h(s, s), where k is the sum of the weights at
     a node; k must be equal for all nodes.
     """
+    equations = equations.projected
     apart = replace(equations, layers=())
     apart.expect_alike("complete synchronisation")
     node = equations.node
@@ -39,6 +40,7 @@ def expect_vanishing(what: str, equations: Equations) -> None:
     Otherwise the synchronous motion is the same for all strengths, and deviations split into modes of the graph.
     """
     equations.expect_exact_links(what)
+    equations = equations.projected
     if not all(edge.diffusive for edge in equations.edges):
         raise ValueError(
             f"{what}: a link acts between equal states, so that the synchronous motion changes with its strength; expected "

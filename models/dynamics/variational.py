@@ -87,7 +87,7 @@ def expect_continuous(orbit: Equations) -> None:
     """
     # Jumps of the modes of contacts are allowed: saltation treats them at the events.
     templates = [(node.state, node.rhs, node.continuous) for node in orbit.nodes]
-    templates += [(edge.here, edge.rhs, (*edge.here, *edge.there)) for edge in orbit.edges]
+    templates += [(edge.here, edge.rhs, tuple(s for end in edge.end_states for s in end)) for edge in orbit.edges]
     for states, rates, moving in templates:
         deviating = [e for s, e in zip(states, rates, strict=True) if not s.name.startswith(LOG_VOLUME.name)]
         part = discontinuity(deviating, set(moving))
@@ -114,6 +114,7 @@ def mode(equations: Equations, plane: bool = False) -> Variation:
     ----------
     Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); several layers: Sorrentino, New J. Phys. 14, 033035 (2012).
     """
+    equations = equations.projected
     node = synchronous_node(equations)
     slopes = source_slopes(equations)
     if node is not equations.node and (equations.inertial or equations.sticks):
@@ -176,6 +177,9 @@ def clustered(equations: Equations, clusters: Clusters) -> ClusterVariation:
     Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014); several layers and links that act between
     equal states: Zhang & Motter, SIAM Rev. 62, 817 (2020).
     """
+    if max(clusters.classes) > 0:
+        equations.expect_pairs("cluster states of several clusters")
+    equations = equations.projected
     _expect_clusterable(equations)
     by_classes = by_class(equations, clusters.classes)
     orbit, firsts = collapse(by_classes, clusters.classes), [members[0] for members in clusters.members]
@@ -327,7 +331,8 @@ def with_volume(equations: Equations) -> Equations:
     def of_edge(edge: Edge) -> Edge:
         here, there = (sp.Symbol(f"{LOG_VOLUME}_{end}", real=True) for end in ("here", "there"))
         rates = (*edge.rhs, divergence(edge.rhs, edge.here))
-        return replace(edge, here=(*edge.here, here), there=(*edge.there, there), rhs=rates)
+        beyond = (*edge.beyond, sp.Symbol(f"{LOG_VOLUME}_beyond", real=True)) if edge.beyond else ()
+        return replace(edge, here=(*edge.here, here), there=(*edge.there, there), beyond=beyond, rhs=rates)
 
     return equations.map_templates(of_node, of_edge)
 
@@ -342,7 +347,7 @@ def source_slopes(equations: Equations) -> tuple[sp.Matrix, ...]:
 
     The strength is sigma, or the only parameter that is a factor of the whole link.
     """
-    several = len(equations.layers) > 1
+    equations, several = equations.projected, len(equations.layers) > 1
     equations.expect_alike("transversal modes of complete synchronisation", inertia_too=not several, layers_too=True)
     if not equations.layers:
         raise ValueError("these equations have no coupling; a transversal mode needs links")

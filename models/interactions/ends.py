@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal, overload
 
 import sympy as sp
 
@@ -38,20 +39,27 @@ class End:
         return [*self._states, *self._parameters]
 
 
-def ends(node: Oscillator, source: Oscillator | None = None) -> tuple[End, End, sp.Symbol]:
-    """Return the two ends of a link and its weight, for the expressions of a coupling.
+@overload
+def ends(node: Oscillator, source: Oscillator | Literal[2] | None = None) -> tuple[End, End, sp.Symbol]: ...
+@overload
+def ends(node: Oscillator, source: Literal[3]) -> tuple[End, End, End, sp.Symbol]: ...
+def ends(node: Oscillator, source: Oscillator | Literal[2, 3] | None = None) -> tuple[End | sp.Symbol, ...]:
+    """Return the ends of a link and its weight, for the expressions of a coupling.
 
     Parameters
     ----------
     node : Oscillator
         The oscillator at the target; also at the source if `source` is left out.
-    source : Oscillator, optional
-        The oscillator at the source of a link between two kinds.
+    source : Oscillator or 3, optional
+        The oscillator at the source of a link between two kinds.  3 stands for a link of three ends, in which the
+        target feels two sources together.
 
     Returns
     -------
     i, j : End
         Target and source: `i.x` is the state x of the target, `j.m` the parameter m of the source.
+    k : End
+        The second source of a link of three ends; it has states only.
     W : Symbol
         The weight of the link.
 
@@ -72,7 +80,16 @@ def ends(node: Oscillator, source: Oscillator | None = None) -> tuple[End, End, 
     >>> i, j, W = ends(load_oscillator("harmonic"))
     >>> W * (j.x - i.x)
     weight*(-x_i + x_j)
+    >>> i, j, k, W = ends(load_oscillator("harmonic"), 3)
+    >>> W * (j.x * k.x - i.x**2)
+    weight*(-x_i**2 + x_j*x_k)
     """
+    if isinstance(source, int):
+        check_instance("ends", node, Oscillator, "an Oscillator")
+        if source not in (2, 3):
+            raise ValueError(f"ends: found {source}; expected 2 or 3 ends of a link")
+        first, second = (End(letter, node.states, tuple(node.parameters)) for letter in "ij")
+        return (first, second, *([End("k", node.states, ())] if source == 3 else []), WEIGHT)
     oscillators = (
         check_instance("ends", each, Oscillator, "an Oscillator") for each in (node, node if source is None else source)
     )
@@ -102,9 +119,10 @@ class Pair:
     oscillators: tuple[Oscillator | None, Oscillator | None]  # their models; None for nodes whose masses are 1
     here: Symbols = field(init=False)
     there: Symbols = field(init=False)
+    beyond: Symbols = field(init=False)  # of the second source of a link of three ends, a node like the source
 
     def __post_init__(self) -> None:
-        for name, letter, node in zip(("here", "there"), "ij", self.nodes, strict=True):
+        for name, letter, node in zip(("here", "there", "beyond"), "ijk", (*self.nodes, self.nodes[1]), strict=True):
             object.__setattr__(self, name, tuple(sp.Symbol(f"{s.name}_{letter}", real=True) for s in node.state))
 
     @property
@@ -149,7 +167,7 @@ class Pair:
     def symbols(self) -> dict[sp.Symbol, sp.Symbol]:
         """Return for each symbol of `ends` the symbol in an `Edge`: m in place of the parameter m_i of the target."""
         of_target = {sp.Symbol(f"{s.name}_i", real=True): s for s in self.nodes[0].parameters}
-        return {**{s: s for s in (*self.here, *self.there, *self.theirs, WEIGHT, TIME)}, **of_target}
+        return {**{s: s for s in (*self.here, *self.there, *self.beyond, *self.theirs, WEIGHT, TIME)}, **of_target}
 
 
 def directed(energy: sp.Expr, exchanged: sp.Expr) -> tuple[sp.Expr, bool]:

@@ -36,10 +36,11 @@ _TAKEN = frozenset({"pi", FRICTION_NAME, *FUNCTIONS})
 
 @dataclass(frozen=True, slots=True, init=False)
 class Rates:
-    """A link that adds terms to the rates of its target and does not act back on the source.
+    """A link that adds terms to the rates of its target and does not act back on the sources.
 
     A term of a link of weight W from j to i may be any function of the states and parameters of both ends, of W, of the
-    parameters of the link and of time.  The term need not vanish between equal states.
+    parameters of the link and of time.  The term need not vanish between equal states.  A link with symbols of a second
+    source, x_k, has three ends; its graph is a `Hypergraph`, over whose triangles the terms are added.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ class Rates:
         values = [
             _parsed(f"rates of a link: rate of {name}", e) for name, e in zip(targets, table.values(), strict=True)
         ]
-        checked, defaults = _checked("rates of a link", values, parameters)
+        checked, defaults = _checked("rates of a link", values, parameters, ("_i", "_j", "_k"))
         for name, rate in zip(targets, checked, strict=True):
             if rate == 0:
                 raise ValueError(f"rates of a link: the rate of {name!r} is 0; expected a function; leave it out")
@@ -105,6 +106,12 @@ class Rates:
     def forced(self) -> bool:
         """True if time occurs."""
         return any(e.has(TIME) for e in self.rates.values())
+
+    @property
+    def triadic(self) -> bool:
+        """True if the link has three ends: a state of the second source occurs."""
+        symbols = {s for e in self.rates.values() for s in e.free_symbols} - _of_link(self.parameters)
+        return any(s.name.endswith("_k") for s in symbols)
 
     def canonical(self, state: tuple[str, ...], coordinates: tuple[str, ...]) -> Rates:
         """Return the coupling itself: equal rates have one spelling."""
@@ -140,7 +147,8 @@ class Potential:
     """A link with a potential of the coordinates and parameters of its two ends, so that forces act on both ends.
 
     A link of weight W between i and j stores the energy V(i, j).  If V changes when the ends are exchanged, the link
-    has a direction (`synchain.models.interactions.link`), and weights other than 1 are refused.
+    has a direction (`synchain.models.interactions.link`), and weights other than 1 are refused.  A potential with symbols
+    of three ends, such as x_i, x_j and x_k, is the energy of a triangle; it is equal for all orders of the ends.
 
     Parameters
     ----------
@@ -178,11 +186,17 @@ class Potential:
 
     def __init__(self, energy: object, parameters: Mapping[sp.Symbol | str, object] | None = None) -> None:
         what = "potential of a link"
-        (e,), defaults = _checked(what, [_parsed(what, energy)], parameters)
+        (e,), defaults = _checked(what, [_parsed(what, energy)], parameters, ("_i", "_j", "_k"))
         object.__setattr__(self, "energy", e)
         object.__setattr__(self, "parameters", defaults)
         if not {"_i", "_j"} <= {s.name[-2:] for s in self._of_ends()}:
             raise ValueError(f"{what}: found {short_repr(e)}, of one end; expected a function of both")
+        # Each node of a triangle feels the derivative by its own coordinates.
+        orders = [self._exchanged("ij"), self._exchanged("jk")] if self.triadic else []
+        if any(sp.expand(e - other) != 0 and sp.simplify(e - other) != 0 for other in orders):
+            raise ValueError(
+                f"{what}: found {short_repr(e)}, which changes if ends are exchanged; expected an energy of three equal ends"
+            )
 
     def __reduce__(self) -> tuple[type[Potential], tuple[object, ...]]:
         return Potential, (self.energy, dict(self.parameters))
@@ -207,23 +221,33 @@ class Potential:
         pair = Pair((single, other or single), (None, None))
         # An energy that contains velocities is a kinetic energy or a dissipation, not a potential.
         used = _in_symbols_of(pair, self, self.energy).free_symbols
-        speeds = sorted(s.name for s in used & set(pair.velocities))
+        velocities = {*pair.velocities, *pair.beyond[len(pair.beyond) // 2 :]}
+        speeds = sorted(s.name for s in used & velocities)
         if speeds:
             raise ValueError(
                 f"coupling '{self}': found the velocity {speeds[0]!r} in the energy; expected coordinates and parameters"
             )
 
+    @property
+    def triadic(self) -> bool:
+        """True if the energy is that of a triangle: a symbol of a third end occurs."""
+        return any(s.name.endswith("_k") for s in self._of_ends())
+
+    def _exchanged(self, letters: str) -> sp.Expr:
+        """Return the energy with two ends exchanged."""
+        swap = dict(zip(letters, reversed(letters), strict=True))
+        return self.energy.xreplace(
+            {s: sp.Symbol(s.name[:-1] + swap.get(s.name[-1], s.name[-1]), real=True) for s in self._of_ends()}
+        )
+
     def terms(self, pair: Pair) -> Terms:
-        """Return the energy of a link."""
+        """Return the energy of a link; of a triangle, the half, since a node feels its two sources in both orders."""
+        if self.triadic:
+            return Terms(potential=_in_symbols_of(pair, self, self.energy) / 2)
         if pair.nodes[0] != pair.nodes[1]:
             return Terms(potential=_in_symbols_of(pair, self, self.energy))
         # Between equal nodes compare the energy with the energy of exchanged ends: is the link oriented?
-        exchange = {
-            s: sp.Symbol(s.name[:-1] + ("j" if s.name.endswith("_i") else "i"), real=True) for s in self._of_ends()
-        }
-        energy, oriented = directed(
-            *(_in_symbols_of(pair, self, e) for e in (self.energy, self.energy.xreplace(exchange)))
-        )
+        energy, oriented = directed(*(_in_symbols_of(pair, self, e) for e in (self.energy, self._exchanged("ij"))))
         return Terms(potential=energy, oriented=oriented)
 
     def _of_ends(self) -> set[sp.Symbol]:
@@ -244,7 +268,10 @@ def _of_link(names: Iterable[str]) -> set[sp.Symbol]:
 
 
 def _checked(
-    what: str, values: Iterable[object], parameters: Mapping[sp.Symbol | str, object] | None
+    what: str,
+    values: Iterable[object],
+    parameters: Mapping[sp.Symbol | str, object] | None,
+    ends: tuple[str, ...] = ("_i", "_j"),
 ) -> tuple[tuple[sp.Expr, ...], FrozenDict[Parameter]]:
     """Return the expressions and parameters of a coupling, with every symbol declared and every parameter used."""
     table = _parameters(what, parameters)
@@ -252,8 +279,8 @@ def _checked(
     expressions = tuple(_exact(what, e) for e in values)
     used = {s for e in expressions for s in e.free_symbols}
     for s in sorted(used - of_link, key=lambda s: s.name):
-        if not s.name.endswith(("_i", "_j")) or len(s.name) < 3:
-            names = (*table, *(s.name for s in used if s.name.endswith(("_i", "_j"))))
+        if not s.name.endswith(ends) or len(s.name) < 3:
+            names = (*table, *(s.name for s in used if s.name.endswith(ends)))
             meant = suggestion(s.name, names) or f", or write {s.name}_i for what the node has"
             raise ValueError(
                 f"{what}: undeclared symbol {s.name!r}; expected symbols of both ends, the weight, t and the parameters "
@@ -330,7 +357,7 @@ def _in_symbols_of(pair: Pair, coupling: Rates | Potential, e: sp.Expr) -> sp.Ex
     for s in sorted(e.free_symbols - _of_link(coupling.parameters), key=lambda s: s.name):
         if s not in symbols:
             end, node = ("target", pair.nodes[0]) if s.name.endswith("_i") else ("source", pair.nodes[1])
-            names = [each.name for each in (*node.state, *node.parameters)]
+            names = [each.name for each in (*node.state, *(() if s.name.endswith("_k") else node.parameters))]
             raise ValueError(
                 f"coupling '{coupling}': unknown {s.name[:-2]!r} at the {end} of a link; known: {', '.join(names)}"
                 f"{suggestion(s.name[:-2], names)}"

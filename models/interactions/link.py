@@ -64,7 +64,8 @@ def edge(
     strengths = tuple(sp.Symbol(name, real=True) for name in coupling.parameters)
     symbols = tuple(s for s in single.parameters if s not in strengths and s in used)
     theirs = tuple((s, parameter) for s, parameter in pair.theirs.items() if s in used)
-    return Edge(pair.here, pair.there, WEIGHT, rates, (*strengths, *symbols), inertia, theirs, terms.oriented)
+    beyond = pair.beyond if used & set(pair.beyond) else ()
+    return Edge(pair.here, pair.there, WEIGHT, rates, (*strengths, *symbols), inertia, theirs, terms.oriented, beyond)
 
 
 def strength(edge: Edge, parameters: Iterable[sp.Symbol] = ()) -> sp.Symbol:

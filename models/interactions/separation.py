@@ -75,7 +75,7 @@ def summed(edge: Edge, varied: tuple[str, ...] = (), numbered: tuple[str, ...] =
     Sines and cosines are bounded, so the addition theorems cost at most a rounding error of the rate.  Powers and
     exponentials of differences stay in the remainder, because far from the origin their products are large and cancel.
     """
-    if edge.inertia or edge.oriented or edge.forced:
+    if edge.inertia or edge.oriented or edge.forced or edge.beyond:
         return None
     source = frozenset((*edge.there, *(s for s, _ in edge.theirs)))
     target = frozenset((*edge.here, *(s for s in edge.parameters if s.name in varied)))
@@ -100,7 +100,7 @@ def summed(edge: Edge, varied: tuple[str, ...] = (), numbered: tuple[str, ...] =
 @lru_cache(maxsize=64)
 def separated(edge: Edge, varied: tuple[str, ...] = ()) -> Separated | None:
     """Return a link as sums of products; None unless the difference from the link is proved to be zero."""
-    if edge.inertia or edge.oriented:
+    if edge.inertia or edge.oriented or edge.beyond:
         return None
     # Symbols of the source, and of the target with parameters that differ from node to node.
     theirs = dict(edge.theirs)

@@ -130,15 +130,21 @@ class Edge:
     inertia: tuple[Block, ...] = ()
     theirs: tuple[tuple[sp.Symbol, sp.Symbol], ...] = ()  # pairs: symbol in `rhs`, parameter of the source
     oriented: bool = False
+    beyond: tuple[sp.Symbol, ...] = ()  # states of the second source of a link of three ends; empty for two ends
 
     def __post_init__(self) -> None:
-        sources = tuple(s for s, _ in self.theirs)
-        _check_names("edge", (TIME, self.weight, *self.here, *self.there, *self.parameters, *sources))
-        declared = {self.weight, *self.here, *self.there, *self.parameters}
+        sources, states = tuple(s for s, _ in self.theirs), [s for end in self.end_states for s in end]
+        _check_names("edge", (TIME, self.weight, *states, *self.parameters, *sources))
+        declared = {self.weight, *states, *self.parameters}
         _check("edge", self.rhs, len(self.here), {TIME, *declared, *sources})
         for block in self.inertia:
             for row in block:
                 _check("edge inertia", row, len(row), declared)
+
+    @property
+    def end_states(self) -> tuple[tuple[sp.Symbol, ...], ...]:
+        """The states at the target, at the source, and at the second source of a link of three ends."""
+        return (self.here, self.there, self.beyond) if self.beyond else (self.here, self.there)
 
     def jacobian_here(self) -> Block:
         """Return d(rhs)/d(here)."""
@@ -147,6 +153,10 @@ class Edge:
     def jacobian_there(self) -> Block:
         """Return d(rhs)/d(there)."""
         return _jacobian(self.rhs, self.there)
+
+    def jacobian_beyond(self) -> Block:
+        """Return d(rhs)/d(beyond), of a link of three ends."""
+        return _jacobian(self.rhs, self.beyond)
 
     def time_derivative(self) -> tuple[sp.Expr, ...]:
         """Return the partial derivative of rhs with respect to time."""
@@ -175,14 +185,15 @@ class Edge:
 
     def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Edge:
         """Return the edge with every symbol and expression changed."""
-        here, there, rhs, parameters = (
-            tuple(map(change, part)) for part in (self.here, self.there, self.rhs, self.parameters)
+        here, there, beyond, rhs, parameters = (
+            tuple(map(change, part)) for part in (self.here, self.there, self.beyond, self.rhs, self.parameters)
         )
         inertia = tuple(_mapped(block, change) for block in self.inertia)
         return replace(
             self,
             here=here,
             there=there,
+            beyond=beyond,
             weight=change(self.weight),
             rhs=rhs,
             parameters=tuple(p for p in parameters if p.is_Symbol),
@@ -216,7 +227,7 @@ class Edge:
     @property
     def diffusive(self) -> bool:
         """True if the link vanishes between equal states, so that synchronous motion solves the network."""
-        equal = {**dict(zip(self.there, self.here, strict=True)), **dict(self.theirs)}
+        equal = {s: p for end in self.end_states[1:] for s, p in zip(end, self.here, strict=True)} | dict(self.theirs)
         return all(_vanishes(e.xreplace(equal)) for e in self.rhs)
 
 

@@ -96,6 +96,7 @@ def energy_of(model: Model, varied: tuple[str, ...] = ()) -> EnergyTerms:
             name = kind.oscillator.name
             raise ValueError(f"energy: oscillator {name!r} is a vector field; expected one with a Lagrangian")
     equations = model.equations(varied)
+    equations.expect_pairs("energy")
     if equations.sticks:
         raise ValueError("energy: set-valued friction does work that is no function of the state; use contact 'atan'")
     nodes = tuple(_of_node(kind, model.contact) for kind in kinds)

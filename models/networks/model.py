@@ -14,6 +14,7 @@ from ..definitions.table import as_name_or_table
 from ..dynamics import network
 from ..dynamics.equations import Equations
 from ..graphs.families import topology
+from ..graphs.hypergraph import Hypergraph
 from ..graphs.links import LINK_LIMIT, numbered
 from ..graphs.topology import Topology
 from ..inputs.checks import check_number, listed, short_repr, suggestion
@@ -156,7 +157,8 @@ class Model:
 
     def check_links(self) -> None:
         """Raise ValueError if a coupling cannot join the oscillators of a graph with links."""
-        if self.linked and (len(self.kinds) > 1 or any(graph.link_count > LINK_LIMIT for _, graph in self.linked)):
+        several, hyper = len(self.kinds) > 1, any(isinstance(graph, Hypergraph) for _, graph in self.linked)
+        if several or hyper or any(graph.link_count > LINK_LIMIT for _, graph in self.linked):
             self.equations()
         for coupling, _ in self.linked if len(self.kinds) == 1 else ():
             coupling.check_ends(self.unlinked.node)

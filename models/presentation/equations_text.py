@@ -247,16 +247,18 @@ class _NetworkText:
         node = equations.node
         states = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in node.state)
         here = dict(zip(node.state, states, strict=True))
-        weights = {name: sp.Symbol(f"{name}_ij", real=True) for _, name in self.layers}
+        indices = {name: "ijk"[: len(edge.end_states)] for edge, name in self.layers}
+        weights = {name: sp.Symbol(f"{name}_{indices[name]}", real=True) for _, name in self.layers}
 
         # Choose letters for states and parameters of node i, values of the link ij, states and parameters of node j.
         letters = self._letters(named, states, "i") | {s: style.letter(s.name, "i") for s in self.varied}
         numbered = tuple(sp.Symbol(name, real=True) for name in equations.numbered)
         letters |= {s: style.letter(s.name, "ij") for s in numbered}
         for edge, name in self.layers:
-            letters |= self._letters(named, edge.here, "i") | self._letters(named, edge.there, "j")
+            for states, index in zip(edge.end_states, "ijk", strict=False):
+                letters |= self._letters(named, states, index)
             letters |= {s: style.letter(of.name, "j") for s, of in edge.theirs}
-            letters[weights[name]] = style.letter(name, "ij")
+            letters[weights[name]] = style.letter(name, indices[name])
         writer = ExpressionWriter(style, letters, frozenset({TIME, *letters} - set(weights.values())))
 
         for c in _shown(equations):
@@ -264,10 +266,10 @@ class _NetworkText:
             row = [e.xreplace(here) for e in _masses(node, c)]
             left = _massive(row, states, writer) if row else writer.write(here[node.state[c]]) + "'"
             for edge, name in self.layers:
-                weight, ends = weights[name], (*edge.here, *edge.there)
+                weight, ends = weights[name], tuple(s for states in edge.end_states for s in states)
                 if edge.rhs[c] != 0:
                     inside = (weight, *ends, *(s for s, _ in edge.theirs), *numbered)
-                    summed = _summed(edge.rhs[c].xreplace({edge.weight: weight}), inside, writer)
+                    summed = _summed(edge.rhs[c].xreplace({edge.weight: weight}), inside, writer, len(indices[name]))
                     line = line + summed if line != "0" else summed.removeprefix(" + ").lstrip()
                 if edge.inertia:  # links with inertia add masses times rates to the left side
                     masses = (e for block in edge.inertia for e in block[c])
@@ -297,12 +299,16 @@ class _NetworkText:
         """Explain the range of the indices and the meaning of the weights."""
         equations, style, meaning = self.equations, self.style, ""
         linked = (layer for layer in equations.layers if layer.links)
-        for layer, (_, name) in zip(linked, self.layers, strict=True):
+        for layer, (edge, name) in zip(linked, self.layers, strict=True):
             shown = WEIGHT_NUMBER.name if WEIGHT_NUMBER.name in layer.varied else name
-            meaning += f", {style.letter(shown, 'ij')}" + style.words(f" the weights of the {len(layer.links)} links")
+            index = "ijk"[: len(edge.end_states)]
+            meaning += f", {style.letter(shown, index)}" + style.words(f" the weights of the {len(layer.links)} links")
         if any(edge.oriented for edge in equations.edges):
             meaning += style.words(", -1 where a link runs from j to i")
-        return ("i, j" if equations.link_count else "i") + f" = 1, {style.dots}, {equations.n}{meaning}"
+        return (
+            ", ".join("ijk"[: max((len(edge.end_states) for edge in equations.edges), default=1)])
+            + f" = 1, {style.dots}, {equations.n}{meaning}"
+        )
 
     def _letters(
         self, named: _NamedNode, symbols: tuple[sp.Symbol, ...], index: str, i: int = 0
@@ -343,13 +349,13 @@ def _massive(row: Sequence[sp.Expr], states: Sequence[sp.Symbol], writer: Expres
     return _with_rates(writer, states).total(terms)
 
 
-def _summed(term: sp.Expr, inside: tuple[sp.Symbol, ...], writer: ExpressionWriter) -> str:
-    """Write a sum over j with its sign; factors without the symbols `inside` precede the sum sign."""
+def _summed(term: sp.Expr, inside: tuple[sp.Symbol, ...], writer: ExpressionWriter, ends: int = 2) -> str:
+    """Write a sum over the sources of links with its sign; factors without the symbols `inside` precede the sum sign."""
     term = sp.factor_terms(term) if term.is_Add else term
     negative = term.as_coeff_Mul()[0].is_negative
     outer, inner = (-term if negative else term).as_independent(*inside, as_Add=False)
     front = [writer.write(outer)] if outer.is_Mul else writer.factors(outer) if outer != 1 else []
-    summed = writer.style.product([*front, writer.style.sum_over_j, *writer.factors(inner)])
+    summed = writer.style.product([*front, writer.style.sums[ends - 2], *writer.factors(inner)])
     return (" - " if negative else " + ") + summed
 
 

@@ -41,7 +41,7 @@ class Latex:
     """The style LaTeX, without \\left and \\right."""
 
     bars = True  # fractions have a bar: sums in them need no parentheses
-    sum_over_j = "\\sum_j "
+    sums = "\\sum_j ", "\\sum_{j,k} "  # over the sources of links of two ends, of three
     dots = "\\dots"
 
     def words(self, text: str) -> str:
@@ -101,7 +101,7 @@ class Text:
     """The style plain text, with Greek letters and superscripts."""
 
     bars = False
-    sum_over_j = "Σ_j"
+    sums = "Σ_j", "Σ_jk"
     dots = "…"
 
     def words(self, text: str) -> str:

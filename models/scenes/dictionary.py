@@ -11,6 +11,7 @@ from typing import Any
 from ..definitions.table import as_name_or_table, as_text_or_table
 from ..graphs.families import family, names, topology
 from ..graphs.graph_text import checked_name, is_composed, read_graph
+from ..graphs.hypergraph import Hypergraph, triangles
 from ..graphs.readers import edge_graph
 from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import check_integer, check_keys, check_table, check_text, short_repr
@@ -81,9 +82,13 @@ def graph_of(table: Mapping[object, Any], folder: Path | None = None) -> Topolog
     name = _placed(table.get("name"), folder)
     is_family = isinstance(name, str) and "matrix" not in table and (name in names() or name.endswith(".py"))
     options = family(str(name)).options if is_family else {}
-    check_keys("topology", table, ("name", "n", *options, "matrix", "edges", "labels", "directed", "file"))
+    check_keys("topology", table, ("name", "n", *options, "matrix", "edges", "triangles", "labels", "directed", "file"))
     if "file" in table:
         return _of_file(table, folder)
+    if "triangles" in table:
+        check_keys("topology", table, ("name", "n", "triangles"))
+        name = check_text("topology name", table.get("name", "triangles"))
+        return checked_name("topology", triangles(table["triangles"], table.get("n"), name))
     if "edges" in table:
         return _of_edges(table)
     if "matrix" in table:
@@ -96,7 +101,7 @@ def graph_of(table: Mapping[object, Any], folder: Path | None = None) -> Topolog
     for key in ("name", "n"):
         if key not in table:
             raise ValueError(
-                f"topology: {key!r} is missing in {short_repr(dict(table))}; expected name and n, or edges, or matrix, or file"
+                f"topology: {key!r} is missing in {short_repr(dict(table))}; expected name and n, or edges, triangles, matrix, or file"
             )
     n = check_integer("topology n", table["n"], 0, MOST_NODES)
     text = part("topology name", name)
@@ -179,6 +184,9 @@ def graph_table(graph: Topology) -> dict[str, object]:
 
     A weighted complete graph may have too many links for a list, so it becomes text: "weighted(complete(100), 1/100)".
     """
+    if isinstance(graph, Hypergraph):
+        listed = [[i + 1, j + 1, k + 1, *([] if w == 1 else [str(w)])] for i, j, k, w in graph.triangles]
+        return {"name": str(graph.name), "n": graph.n, "triangles": listed}
     try:
         composed = graph.all_to_all is not None and is_composed(graph.name)
         same = (read_graph(graph.name) if composed else topology(graph.name, graph.n, **dict(graph.options))) == graph

@@ -197,6 +197,8 @@ def _graphs() -> list[Table]:
         "name": TEXT,
         "n": WHOLE,
     }
+    triangle = {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 3, "maxItems": 4}
+    triangles: dict[str, Table] = {"triangles": {"type": "array", "items": triangle}, "name": TEXT, "n": WHOLE}
     composed: dict[str, Table] = {"name": {"type": "string", "pattern": r"\("}, "n": WHOLE}
     return [
         *(_family(family(name)) for name in families()),
@@ -204,6 +206,7 @@ def _graphs() -> list[Table]:
         _table(composed, "name", "n"),
         _table(matrix, "matrix"),
         _table(edges, "edges"),
+        _table(triangles, "triangles"),
         _table({"file": {"type": "string"}}, "file"),
     ]
 

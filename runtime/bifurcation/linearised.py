@@ -214,6 +214,7 @@ def _node_templates(equations: Equations) -> Iterator[TermTemplate]:
 
 def _link_templates(equations: Equations) -> Iterator[TermTemplate]:
     """Yield the template of the links of each layer between each two kinds."""
+    equations.expect_pairs("equilibria")
     for layer in equations.layers:
         for ends, edge in layer.edge_of:
             links = [link for link in layer.links if equations.ends(link) == ends]

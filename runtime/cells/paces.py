@@ -12,7 +12,7 @@ import sympy as sp
 
 from synchain.codegen.steps.mass_solve import turned_masses
 from synchain.codegen.taylor import is_analytic, is_large
-from synchain.models.dynamics.equations import Equations, Layer
+from synchain.models.dynamics.equations import Equations, Layer, Triad
 from synchain.models.graphs.links import AllPairs, Link
 from synchain.models.inputs.names import NodeName
 from synchain.models.mechanics.components import TIME, Block, Edge, Node
@@ -253,7 +253,7 @@ def _node_part(
 def _link_parts(equations: Equations, slots: dict[str, int]) -> Iterator[TemplateRates]:
     """Yield the links that the first nodes feel, template by template."""
     for layer in equations.layers:
-        pairs, share = layer.links, 1.0
+        pairs, share, links = layer.links, 1.0, list[Link | Triad]()
         if isinstance(pairs, AllPairs):
             # All pairs of nodes: take a few evenly spread sources of each node, each of which represents several.
             count = min(pairs.n, NODES)
@@ -262,7 +262,7 @@ def _link_parts(equations: Equations, slots: dict[str, int]) -> Iterator[Templat
             links = [(i, (i + gap) % pairs.n, pairs.weight) for i in range(count) for gap in gaps]
             share = (pairs.n - 1) / max(each, 1)
         else:
-            links = [link for link in pairs if link[0] < NODES][:LINKS]
+            links = [link for link in layer.each() if link[0] < NODES][:LINKS]
         for ends, edge in layer.edge_of:
             alike = [link for link in links if equations.ends(link) == ends]
             if alike:
@@ -270,25 +270,28 @@ def _link_parts(equations: Equations, slots: dict[str, int]) -> Iterator[Templat
 
 
 def _link_part(
-    equations: Equations, slots: dict[str, int], layer: Layer, edge: Edge, links: list[Link], share: float
+    equations: Equations, slots: dict[str, int], layer: Layer, edge: Edge, links: list[Link | Triad], share: float
 ) -> TemplateRates:
-    targets, sources = [i for i, _, _ in links], [j for _, j, _ in links]
+    targets, sources = [link[0] for link in links], [link[1] for link in links]
+    # The states of both sources of a link of three ends follow each other.
+    felt = [[place for i in (link[1], *link[3:]) for place in equations.places[i]] for link in links]
     columns: list[Column] = []
     for s in edge.parameters:
         if s.name in layer.varied:
-            columns.append(np.array([slots[layer.name(s.name, link)] for link in links]))
+            columns.append(np.array([slots[layer.name(s.name, (link[0], link[1], link[2]))] for link in links]))
         else:
             columns.append(_of_nodes(equations, slots, s.name, targets))
     columns += [_of_nodes(equations, slots, of.name, sources) for _, of in edge.theirs]
-    symbols = (*edge.here, *edge.there, edge.weight, *edge.parameters, *(s for s, _ in edge.theirs), TIME)
+    states = [s for end in edge.end_states for s in end]
+    symbols = (*states, edge.weight, *edge.parameters, *(s for s, _ in edge.theirs), TIME)
     return TemplateRates(
         _function(symbols, edge.rhs),
         _function(symbols, _flat(edge.jacobian_here())),
         np.array([equations.places[i] for i in targets]),
-        np.array([equations.places[j] for j in sources]),
+        np.array(felt),
         np.array(targets),
         tuple(columns),
-        np.array([[float(weight) for _, _, weight in links]]),
+        np.array([[float(link[2]) for link in links]]),
         share,
         _turned(symbols, edge.rhs, edge.here),
     )

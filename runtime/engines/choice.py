@@ -11,7 +11,7 @@ import numpy as np
 from synchain.codegen.driver.clock_slots import WORTH
 from synchain.codegen.driver.columns import Count, SpanColumn, SumColumn
 from synchain.codegen.integrators import Integrator, integrator
-from synchain.codegen.kernels.sweep_kernel import AUTO
+from synchain.codegen.kernels.sweep_kernel import AUTO, LARGEST_UNROLLED
 from synchain.codegen.taylor import (
     is_analytic,
     is_large,
@@ -95,7 +95,9 @@ class Ladder:
 
     @property
     def solvable(self) -> bool:
-        """True if a Rosenbrock method can step the network: no mean field has too many pairs."""
+        """True if a Rosenbrock method can step the network: neither too many pairs nor triangles of many nodes."""
+        if self.equations.triadic and self.equations.n > LARGEST_UNROLLED:
+            return False
         return not any(len(pairs) > LINK_LIMIT for _, pairs in self.equations.fields)
 
     @cached_property

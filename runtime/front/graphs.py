@@ -13,6 +13,7 @@ from .offers import offer
 
 HOMES = {
     "Clusters": "models.symmetries.clusters",
+    "Hypergraph": "models.graphs.hypergraph",
     "Spectrum": "models.spectra.spectrum",
     "Topology": "models.graphs.topology",
     "cartesian": "models.graphs.products",
@@ -30,6 +31,7 @@ HOMES = {
     "read_graphml": "models.graphs.readers",
     "read_matrix": "models.graphs.topology",
     "topology": "models.graphs.families",
+    "triangles": "models.graphs.hypergraph",
     "union": "models.graphs.products",
     "weighted": "models.graphs.products",
 }

@@ -2,6 +2,8 @@
 from collections.abc import Iterable
 from typing import Literal, overload
 
+from synchain.models.graphs.hypergraph import Hypergraph as Hypergraph
+from synchain.models.graphs.hypergraph import triangles as triangles
 from synchain.models.graphs.products import cartesian as cartesian
 from synchain.models.graphs.products import complement as complement
 from synchain.models.graphs.products import kronecker as kronecker

@@ -50,7 +50,10 @@ def _linear(equations: Equations) -> bool:
     """Return True if oscillators are linear in their states, and links linear in the states of both ends."""
     nodes = ((node.state, (node.jacobian(), node.inertia)) for node in equations.nodes)
     edges = (
-        ((*edge.here, *edge.there), (edge.jacobian_here(), edge.jacobian_there(), *edge.inertia))
+        (
+            [s for end in edge.end_states for s in end],
+            (edge.jacobian_here(), edge.jacobian_there(), edge.jacobian_beyond(), *edge.inertia),
+        )
         for edge in equations.edges
     )
     return not equations.sticks and not any(

@@ -153,6 +153,7 @@ def universal_probe(
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     real, imaginary = _broadcast(alpha, beta)
     scene = Given(universal_probe, parameters, more, IN_CRITERION).scene(scene, unused_axes(scene))
+    scene.equations.expect_pairs("the three-oscillator probe")
     if scene.varied:
         scene.equations.expect_alike("the three-oscillator probe")
     partial = preset(criterion, scene)

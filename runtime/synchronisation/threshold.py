@@ -239,6 +239,7 @@ def thresholds(
     1
     """
     check_scene(scene).equations.expect_alike("thresholds")
+    scene.equations.expect_pairs("thresholds")
     expect_vanishing("thresholds", scene.equations)
     scene = Given(thresholds, parameters, more, IN_CRITERION).scene(scene, unused_axes(scene))
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)

@@ -452,6 +452,7 @@ def transition(
     given = Given(transition, parameters, more, ORBITS)
     given.expect_one_cell(check_scene(scene), unused_axes(scene))
     graph = scene.topology
+    scene.equations.expect_pairs("transition")
     if len(scene.model.linked) != 1:
         raise ValueError(f"transition: found {len(scene.model.linked)} layers of links; expected one")
     for eigenvalue in graph.spectrum:

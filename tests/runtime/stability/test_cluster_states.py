@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 
 from synchain import Field, Rates, Scene, cluster_exponents, exponents, run
-from synchain.graphs import Topology, clusters, from_matrix, topology
+from synchain.graphs import Topology, clusters, from_matrix, topology, triangles
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import clustered
 from synchain.results import ClusterExponents
@@ -119,6 +119,7 @@ NODE, OTHER = (
 SYNAPSE = Rates({"x": "g*W*(2 - x_i)*tanh(x_j)"}, {"g": 0.3})
 SPRING = Rates({"y": "k*W*((x_j - x_i) + (x_j - x_i)**3)"}, {"k": 0.2})
 COMMON = Rates({"y": "k*W*y_i*y_j"}, {"k": 0.2})
+THREE = Rates({"x": "q*W*(x_j*x_k*y_j - x_i**2*y_i)"}, {"q": 0.4})
 PUSH = Rates({"x": "q*W*a_i*a_j*(x_j - x_i)"}, {"q": 0.4})
 
 STATES = {
@@ -132,6 +133,9 @@ STATES = {
     "unequal sums inside": ({"oscillator": NODE, "coupling": SYNAPSE}, PANEL, (0, 0, 1, 1, 1)),
     "layers": ({"oscillator": NODE}, [(SPRING, topology("ring", 6)), (SYNAPSE, topology("complete", 6))], (0, 1) * 3),
     "no common modes": ({"oscillator": NODE}, [(SPRING, RING), (PUSH, STAR)], (0, 0, 0, 0)),
+    "three ends": (
+        {"oscillator": NODE}, [(SPRING, RING), (THREE, triangles([(1, 2, 3), (2, 3, 4, "1/2")]))], (0, 0, 0, 0),
+    ),
     "kinds": (
         {"oscillator": NODE, "nodes": [{"oscillator": OTHER, "at": [1, 4]}], "coupling": COMMON},
         topology("ring", 6), (0, 1, 1, 0, 1, 1),
