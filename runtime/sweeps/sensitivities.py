@@ -128,6 +128,7 @@ class Sensitivities:
     planner: Planner  # lays out the rows of the network
     names: tuple[str, ...]
     lift: Lift
+    ladder: Ladder  # tolerances and first steps of the lifted network
     observables: dict[str, Sensitivity]
     source: SweepKernel
     kernel: Kernel
@@ -164,10 +165,11 @@ class Sensitivities:
         )
         # One integrator for all values of the parameters.
         rows, _ = _lifted_rows(planner, lift, names, planner.rows(np.zeros(1, dtype=int)))
-        method = chosen_for_rows(scene.replace(integrator="auto"), lift.equations, rows)
+        auto = scene.replace(integrator="auto")
+        method, ladder = chosen_for_rows(auto, lift.equations, rows), Ladder(auto, lift.equations)
         source, control = emit(lift.equations, method, recording), np.concatenate([control, directions[1:], times])
         indices = np.searchsorted(times, wanted)
-        return cls(scene, planner, names, lift, observables, source, load(source), control, times, indices)
+        return cls(scene, planner, names, lift, ladder, observables, source, load(source), control, times, indices)
 
     def of_rows(
         self, rows: CellRows, ran: np.ndarray
@@ -193,11 +195,11 @@ class Sensitivities:
     def _run(self, rows: CellRows, room: int = ROOM) -> Buffers:
         """Run the lifted network; with larger buffers if there are more extremes."""
         sizes, control = self.source.dimensions, self.control.copy()
-        tolerances = Ladder(self.scene, self.lift.equations).tolerances(rows)
+        tolerances = self.ladder.tolerances(rows)
         control[0], control[1] = (column.min() for column in tolerances)
         if self.source.method.implicit:
             spans = rows.spans.copy()
-            spans[:, SpanColumn.FIRST_STEP] = first_steps(Ladder(self.scene, self.lift.equations).templates, rows)
+            spans[:, SpanColumn.FIRST_STEP] = first_steps(self.ladder.templates, rows)
             rows = replace(rows, spans=spans)
         tallies = 1 + len(Tally) * sizes.observed if sizes.observed else 0
         room = room if sizes.sections else 0
