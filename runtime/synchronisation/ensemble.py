@@ -105,10 +105,9 @@ class Ensemble:
         count = len(self.cell)
         self.passed, self.error = np.zeros(count), np.full(count, np.inf)
         self.status = np.full(count, int(Status.NOT_RUN))
+        self.approach, self.watch = self._kernels()
+        self.names = list(self.watch.scene.observe)
         self.certificate = self._certificate()
-        kernels = self._kernels()
-        self.names = list(kernels[1].scene.observe)
-        self.approach, self.watch = kernels
         self.windows = np.full((2, count, len(self.names)), np.nan)  # observables of the last two windows
         self.errors = np.full((2, count), np.nan)  # mean errors in these windows
         self.lengths = np.full((2, count), np.nan)  # lengths of these windows
@@ -138,7 +137,9 @@ class Ensemble:
         nothing = Certificate(*(np.full(self.scene.cells, np.nan) for _ in range(5)))
         if not self.criteria:
             return nothing
-        single = self.scene.replace(stop=None)
+        # exponents of stiff cells take Rosenbrock steps, as the cells do
+        stiff = self.scene.integrator == "auto" and self.approach.method.implicit
+        single = self.scene.replace(stop=None, integrator=self.approach.method.name if stiff else self.scene.integrator)
         # the precision is the least exponent that shows within the transient
         precision = 0.5 / float(self.spans[:, SpanColumn.END].max())
         workers = self.execution.workers

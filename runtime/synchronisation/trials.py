@@ -58,6 +58,7 @@ class Trials:
         expand: Callable[[Buffers], Buffers] | None = None,
     ) -> None:
         self.scene, self.width, self.execution, self.expand = scene, source.width, execution, expand
+        self.method = source.method  # with which most cells begin
         began = time.perf_counter()
         job = problem.job(JobSpec.of(problem, source), load(source))
         self._compiling = time.perf_counter() - began

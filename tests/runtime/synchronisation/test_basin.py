@@ -14,6 +14,7 @@ from scipy.stats import binomtest
 from synchain import Criterion, Field, Scene, basin, universal_probe
 from synchain.graphs import chain
 from synchain.results import Basin, Probe, Status
+from synchain.runtime.synchronisation import ensemble
 from synchain.runtime.synchronisation.starts import Starts
 
 FREE = Scene(oscillator="harmonic", topology=chain(2), parameters={"sigma": 0.0})
@@ -340,6 +341,23 @@ def test_basin_of_a_swing_machine_ends_at_the_stable_manifold_of_its_saddle():
         assert low < exact < high
         for name in named:
             assert not (of(early, name) & ~of(found, name)).any()
+    # without names too, a motion that changes from window to window is no attractor
+    early = basin(PENDULUM, samples=1000, ranges=REGION, transient=20.0, window=10.0, show_progress=False)
+    assert share(early, "approaching") > 0.5
+    assert share(groups, "approaching") == 0.0
+
+
+def test_exponents_of_stiff_cells_take_the_steps_of_the_cells(monkeypatch):
+    """A variable that decays at the rate 2000 beside slow motion: no warning of short Taylor steps, which nobody chose."""
+    asked, certify = [], ensemble.certify
+    monkeypatch.setattr(
+        ensemble, "certify", lambda scene, **more: asked.append(scene.integrator) or certify(scene, **more)
+    )
+    fast = Field({"x": "y", "y": "z - x - 0.1*y", "z": "2000*(sin(y) - z)"})
+    stiff = Scene(fast, "x->y", chain(2), parameters={"sigma": 0.2}, transient=20.0, window=5.0)
+    assert basin(stiff, samples=4, show_progress=False).exponent[0] < 0.0
+    assert basin(stiff.replace(integrator="dop853"), samples=4, show_progress=False).exponent[0] < 0.0
+    assert asked == ["rodas5p", "dop853"]
 
 
 def test_nodes_are_perturbed_one_after_another():
