@@ -81,7 +81,9 @@ def test_the_shared_keywords_have_the_same_names_and_defaults(name: str) -> None
 
 def test_every_function_that_computes_is_in_the_table() -> None:
     functions = {name for name, home in synchain.HOMES.items() if home.startswith("runtime")} - {"Criterion"}
-    assert functions - {"compile", "kernel", "open_result", "merge", "energy_function", "follow"} == set(TAKEN)
+    assert functions - {"compile", "kernel", "open_result", "merge", "energy_function", "follow", "diagram"} == set(
+        TAKEN
+    )
 
 
 def calls(scene: Scene, path: Any) -> dict[str, Callable[..., object]]:

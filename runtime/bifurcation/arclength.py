@@ -43,6 +43,13 @@ SHORTEST = 1e-9
 """Shortest step; the branch is lost if it must be shorter (a choice)."""
 
 
+FIRST_STEP, LARGEST_STEP = 0.01, 0.05
+"""First and largest step, in parts of the range of the parameter and of the size of the states (choices)."""
+
+MOST = 1000
+"""Most solutions in each direction (a choice)."""
+
+
 @dataclass(frozen=True, slots=True)
 class Point:
     """A solution with its tangent."""

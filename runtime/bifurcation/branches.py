@@ -7,9 +7,9 @@ finds the bifurcations on each step.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, overload
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.names import expect_free
 from synchain.models.scenes.scene import Scene
 
-from .arclength import Limits, Point, correct, walk
+from .arclength import FIRST_STEP, LARGEST_STEP, MOST, Limits, Point, correct, walk
+from .curves import follow_curve
 from .detection import Located, bifurcations
 from .equilibria import Equilibria
 from .equilibrium import Equilibrium, resting_equations
@@ -26,29 +27,51 @@ from .kinds import BifurcationKind
 from .normal_forms import first_lyapunov_coefficient
 from .orbit_tracer import checked_values, traced
 from .periodic import PeriodicOrbit
-from .results import NAMES, Bifurcation, Branch, digits_of
+from .results import NAMES, Bifurcation, Branch, Curve, digits_of
 from .switching import directions
-
-FIRST_STEP, LARGEST_STEP = 0.01, 0.05
-"""First and largest step, in parts of the range of the parameter and of the size of the states (choices)."""
-
-MOST = 1000
-"""Most solutions in each direction (a choice)."""
 
 Direction = Literal["both", "up", "down"]
 
+SIGNS: Mapping[str, tuple[float, ...]] = {"both": (-1.0, 1.0), "up": (1.0,), "down": (-1.0,)}
+"""Signs of the first step of the parameter for each direction."""
 
+
+@overload
 def follow(
     first: Equilibrium | PeriodicOrbit | Bifurcation,
     name: str,
     *,
+    to: float | None = ...,
+    values: Sequence[float] | np.ndarray | None = ...,
+    within: tuple[float, float] | None = ...,
+    direction: Direction = ...,
+    largest_step: float | None = ...,
+    vector: int = ...,
+) -> Branch: ...
+
+
+@overload
+def follow(
+    first: Bifurcation,
+    name: tuple[str, str],
+    *,
+    within: Mapping[str, tuple[float, float]],
+    direction: Direction = ...,
+    largest_step: float | None = ...,
+) -> Curve: ...
+
+
+def follow(
+    first: Equilibrium | PeriodicOrbit | Bifurcation,
+    name: str | tuple[str, str],
+    *,
     to: float | None = None,
     values: Sequence[float] | np.ndarray | None = None,
-    within: tuple[float, float] | None = None,
+    within: tuple[float, float] | Mapping[str, tuple[float, float]] | None = None,
     direction: Direction = "both",
     largest_step: float | None = None,
     vector: int = 0,
-) -> Branch:
+) -> Branch | Curve:
     """Follow an equilibrium or a periodic orbit along a parameter, through folds, and locate its bifurcations.
 
     The branch is followed by its arclength: stable and unstable solutions, and both sides of a fold.  It ends on the
@@ -58,16 +81,17 @@ def follow(
     ----------
     first : Equilibrium, PeriodicOrbit or Bifurcation
         Where the branch begins.  From a branch point the other branch is followed, from a fold both sides.
-    name : str
-        Name of the parameter.
+    name : str or (str, str)
+        Name of the parameter; names of two parameters for a curve of folds or Hopf points of equilibria.
     to : float, optional
         Follow from the value of `first` towards this one and end there, or where the branch returns to its beginning.
     values : array_like, shape (k,), optional
         Values of the parameter at which solutions are added to those of the steps.
-    within : (float, float), optional
-        Bounds of the parameter; by default `to`, `values` and the value of `first` set them.
+    within : (float, float), or mapping of str to (float, float), optional
+        Bounds of the parameter; by default `to`, `values` and the value of `first` set them.  For a curve the bounds of
+        one or both parameters by their names.
     direction : {"both", "up", "down"}
-        Which way the parameter goes at the beginning; `to` decides it if it is given.
+        Which way the parameter, of two the second, goes at the beginning; `to` decides it if it is given.
     largest_step : float, optional
         Largest step of the parameter; by default a twentieth of the bounds.
     vector : int
@@ -75,7 +99,7 @@ def follow(
 
     Returns
     -------
-    Branch
+    Branch or Curve
 
     Warns
     -----
@@ -94,6 +118,8 @@ def follow(
     See Also
     --------
     equilibrium : Find the first equilibrium.
+    equilibria : Find several equilibria.
+    diagram : Draw branches together.
     periodic_orbit : Find the first orbit.
 
     Examples
@@ -113,6 +139,16 @@ def follow(
         raise TypeError(
             f"follow: first: found {typed_repr(first)}; expected an Equilibrium, PeriodicOrbit or Bifurcation"
         )
+    if direction not in SIGNS:
+        raise ValueError(f"direction: found {direction!r}; expected 'both', 'up' or 'down'")
+    if not isinstance(name, str):
+        if not isinstance(first, Bifurcation) or not isinstance(within, Mapping | None):
+            raise ValueError(
+                "follow: found two parameters; expected a fold or Hopf point, and within={name: (low, high)} for a curve"
+            )
+        return follow_curve(first, name, within, SIGNS[direction], largest_step)
+    if isinstance(within, Mapping):
+        raise ValueError("within: found bounds by names; expected (low, high) for one parameter")
     solution = first.solution if isinstance(first, Bifurcation) else first
     scene = solution.scene
     _check_name(scene, name)
@@ -131,11 +167,9 @@ def follow(
     size = size or abs(begin) or 1.0
     largest = LARGEST_STEP if largest_step is None else check_number("largest_step", largest_step, 0.0) / size
     limits = Limits((bounds,), MOST, min(FIRST_STEP, largest), largest, requested)
-    if direction not in ("both", "up", "down"):
-        raise ValueError(f"direction: found {direction!r}; expected 'both', 'up' or 'down'")
     if to is not None:
         direction = "up" if to > begin else "down"
-    signs = {"both": (-1.0, 1.0), "up": (1.0,), "down": (-1.0,)}[direction]
+    signs = SIGNS[direction]
     parts = []
     for sign in signs if not _leaves(first) else (-1.0, 1.0):
         problem = Equilibria(
@@ -237,7 +271,7 @@ def _bifurcation(problem: Equilibria, located: Located) -> Bifurcation:
     coefficient = math.nan
     if located.kind is BifurcationKind.HOPF:
         value = complex(value.real, abs(value.imag))
-        vectors = problem.vectors(point.z, value, count).T
+        vectors = directions(problem.scene, solution.state, problem.vectors(point.z, value, count))
         # Real and imaginary part of the eigenvector are orthogonal at this phase.
         vectors = vectors * np.exp(-0.5j * np.angle((vectors**2).sum(axis=1)))[:, None]
         if count == 1:

@@ -19,7 +19,7 @@ Source: Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed. (Springer, 20
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from scipy.optimize import brentq
@@ -34,6 +34,9 @@ TOGETHER = 1e-8
 TOUCHING = 1e-5
 """Largest growth of the value that touches zero at a turn, relative to the largest value (a choice): it grows as the
 square of the distance, which is located to half of the digits."""
+
+BESIDE = 1e-3
+"""Distance from a turn, relative to the step, at which the value that passes or touches zero is compared (a choice)."""
 
 REAL = 1e-7
 """A value whose imaginary part is smaller, relative to the largest value, is real: the square root of rounding."""
@@ -67,7 +70,7 @@ class Step:
     """The solutions on the hyperplanes between both ends of a step, by their distance from its beginning."""
 
     def __init__(self, problem: Problem, before: Point, after: Point, length: float) -> None:
-        self.problem, self.before, self.length = problem, before, length
+        self.problem, self.before, self.after, self.length = problem, before, after, length
         self.points = {0.0: before, length: after}
 
     def at(self, distance: float) -> Point:
@@ -81,24 +84,16 @@ class Step:
             self.points[distance] = replace(point, critical=critical, length=self.before.length + distance)
         return self.points[distance]
 
-    def growth(self, distance: float, index: int) -> float:
-        """Return the growth of a critical value at a distance."""
-        return float(_critical(self.at(distance)).growth[index])
-
-    def turn(self, distance: float) -> float:
-        """Return the parameter's share of the tangent at a distance."""
-        return float(self.at(distance).tangent[-1])
+    def zero(self, test: Callable[[Point], float]) -> float:
+        """Return the distance at which a function of the solution passes zero."""
+        ends = test(self.before), test(self.after)
+        if ends[0] * ends[1] >= 0.0:  # one end is zero to rounding
+            return 0.0 if abs(ends[0]) < abs(ends[1]) else self.length
+        return float(brentq(lambda h: test(self.at(h)), 0.0, self.length, xtol=1e-14 * self.length, rtol=1e-14))
 
     def zero_of_growth(self, index: int) -> float:
         """Return the distance at which the growth of a critical value passes zero."""
-        ends = self.growth(0.0, index), self.growth(self.length, index)
-        if ends[0] * ends[1] >= 0.0:  # one end is neutral to rounding
-            return 0.0 if abs(ends[0]) < abs(ends[1]) else self.length
-        return float(brentq(lambda h: self.growth(h, index), 0.0, self.length, xtol=1e-14 * self.length, rtol=1e-14))
-
-    def zero_of_turn(self) -> float:
-        """Return the distance at which the parameter turns."""
-        return float(brentq(self.turn, 0.0, self.length, xtol=1e-14 * self.length, rtol=1e-14))
+        return self.zero(lambda point: float(_critical(point).growth[index]))
 
 
 def bifurcations(problem: Problem, before: Point, after: Point, length: float) -> list[tuple[float, object]] | None:
@@ -109,7 +104,7 @@ def bifurcations(problem: Problem, before: Point, after: Point, length: float) -
     if counts[0] == counts[1] and not turned:
         return []
     try:
-        turn = step.zero_of_turn() if turned else None
+        turn = step.zero(lambda point: float(point.tangent[-1])) if turned else None
         located = [*_passing(step, range(*counts), turn)]
     except ArithmeticError:
         return None
@@ -120,8 +115,17 @@ def bifurcations(problem: Problem, before: Point, after: Point, length: float) -
             return None  # two changes of the number cancel on this step
         near = [h for h, each in located if abs(h - turn) < TOGETHER * length and not abs(each.critical.imag) > 0.0]
         if not near:
-            located.append((turn, Located(BifurcationKind.BRANCH_POINT, step.at(turn), touching)))
+            # Of few eigenvalues of a large network one may pass although the number of growing ones stays the same.
+            sides = [_nearest(step.at(min(max(turn + d * length, 0.0), length))) for d in (-BESIDE, BESIDE)]
+            kind = problem.kind(complex(critical.values[touching].real), sides[0] * sides[1] < 0.0)
+            located.append((turn, Located(kind, step.at(turn), touching)))
     return [*_together(located, length)]
+
+
+def _nearest(point: Point) -> float:
+    """Return the growth nearest to zero."""
+    growth = _critical(point).growth
+    return float(growth[abs(growth).argmin()])
 
 
 def _passing(step: Step, indices: range, turn: float | None) -> Iterator[tuple[float, Located]]:

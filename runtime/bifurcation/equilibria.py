@@ -32,6 +32,9 @@ NOISE = 1e-14
 LEAST_SCALE = 0.1
 """Least scale of a component in lengths, relative to that of the largest component (a choice)."""
 
+TINY = 1e-8
+"""A parameter without bounds that is smaller does not set its own length (a choice)."""
+
 REAL = 1e-7
 """An eigenvalue whose imaginary part is smaller, relative to the largest, is real (a choice)."""
 
@@ -66,13 +69,14 @@ class Equilibria:
         self.blocks = ModeBlocks.of(equations)
         self.point = np.concatenate([state, speeds, [self.values[name] for name in names]])
         self.component_scales = np.zeros(len(equations.components))
-        self.ranges = np.array([abs(self.values[name]) or 1.0 for name in names])
+        self.ranges, self.unbounded = np.zeros(len(names)), np.full(len(names), True)
         self.weights = np.zeros(len(self.point))
         self._weigh()
 
     def set_ranges(self, ranges: np.ndarray) -> None:
-        """Set the lengths by which parameters are measured."""
-        self.ranges = ranges
+        """Measure parameters by the lengths of their ranges; one without bounds, inf, by its largest value so far."""
+        self.unbounded = ~np.isfinite(ranges)
+        self.ranges = np.where(self.unbounded, 0.0, ranges)
         self._weigh()
 
     def _weigh(self) -> None:
@@ -84,9 +88,13 @@ class Equilibria:
         # Velocities of a network at rest are zero: their scale is a part of the others'.
         scales = np.maximum(self.component_scales, LEAST_SCALE * self.component_scales.max())
         counts = np.diff([*self.first_of, self.size])
+        values = np.abs(self.point[len(self.point) - len(self.names) :])
+        self.ranges = np.where(
+            self.unbounded, np.maximum(self.ranges, np.where(values > TINY, values, 0.0)), self.ranges
+        )
         self.weights = np.zeros(len(self.point))
         self.weights[: self.size] = 1.0 / (np.sqrt(self.size) * np.repeat(scales, counts))
-        self.weights[len(self.weights) - len(self.names) :] = 1.0 / self.ranges
+        self.weights[len(self.weights) - len(self.names) :] = 1.0 / np.where(self.ranges > 0.0, self.ranges, 1.0)
 
     @cached_property
     def higher(self) -> tuple[Linearised, Linearised]:
@@ -168,7 +176,7 @@ class Equilibria:
         mass = sparse.eye_array(self.size, format="csc") if mass is None else mass
         # At zero the shifts are null vectors too: border the matrix, so that they are left out.
         shifted = jacobian if value else self.bordered(jacobian)
-        size, scale = shifted.shape[0], float(abs(jacobian).max())
+        size, scale = shifted.shape[0], float(abs(jacobian).max()) or 1.0
         heavy = sparse.block_diag([mass, sparse.csc_array((size - self.size,) * 2)], format="csc")
         # Inverse iteration beside the eigenvalue.
         matrix = sparse.csc_array(shifted - (value + 1e-10 * scale * (1.0 + 0.3j)) * heavy)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
+
+from synchain.models.inputs.checks import typed_repr
+from synchain.models.inputs.display import HasPlot
+from synchain.models.scenes.scene import Scene
 
 from ..results.labelled import Labelled, dataset, scene_text
 from ..results.labels import STATE, States
@@ -16,6 +21,9 @@ from .equilibrium import Equilibrium
 from .kinds import BifurcationKind
 from .periodic import PeriodicOrbit
 from .phases import Phases
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Solution = Equilibrium | PeriodicOrbit
 
@@ -137,8 +145,36 @@ class Bifurcation(Labelled):
         return f"{self.kind} at {self.value:.8g}"
 
 
+class Drawable(Labelled):
+    """Branches, which are drawn over their parameter."""
+
+    __slots__ = ()
+
+    def plot(self, ax: Axes | None = None, y: str | None = None, **style: Any) -> Axes:
+        """Draw a state or an observable over the parameter.
+
+        Full lines are stable, dashed ones unstable, marks are bifurcations.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            By default pyplot's current ones, or those of a new figure.
+        y : str, optional
+            The name of a state, such as "x_1", at rest or at the start of a period; or an observable over one period,
+            such as "maximum(x_1)", as `Scene.observe` takes.  By default the first state.
+        **style
+            Keywords of the lines, such as `color` and `linewidth`.
+
+        Returns
+        -------
+        matplotlib axes
+        """
+        axes: Axes = HasPlot.plot(self, ax, y=y, **style)
+        return axes
+
+
 @dataclass(frozen=True, slots=True, repr=False)
-class Branch(Labelled):
+class Branch(Drawable):
     """Equilibria or periodic orbits along a parameter, in the order of the branch; reads like a tuple of them.
 
     Parameters
@@ -165,7 +201,7 @@ class Branch(Labelled):
     See Also
     --------
     follow : Follow a branch.
-    skeleton : Search orbits and follow all of them.
+    diagram : Draw several branches together.
     """
 
     name: str
@@ -245,3 +281,183 @@ class Branch(Labelled):
         if self.ends:
             rows.append(("ends", "; ".join(self.ends)))
         return (*rows, *((("lost", f"at {digits_of(self.lost)}"),) if self.lost else ()))
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Diagram(Drawable):
+    """Several branches over one parameter; reads like a tuple of them.
+
+    Parameters
+    ----------
+    branches : tuple of Branch
+        The branches.
+
+    See Also
+    --------
+    diagram : Put branches together.
+    """
+
+    branches: tuple[Branch, ...]
+
+    def __len__(self) -> int:
+        return len(self.branches)
+
+    def __iter__(self) -> Iterator[Branch]:
+        return iter(self.branches)
+
+    def __getitem__(self, index: int) -> Branch:
+        return self.branches[index]
+
+    @property
+    def data(self) -> xr.Dataset:
+        """The data of all branches along one row of points, with the number of the branch as coordinate."""
+        parts = []
+        for number, branch in enumerate(self.branches):
+            part = branch.data.drop_dims("turn")
+            parts.append(part.assign_coords(branch=("point", np.full(len(branch), number))))
+        return xr.concat(parts, "point") if parts else xr.Dataset()
+
+    @property
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """One row for each branch."""
+        rows = []
+        for k, branch in enumerate(self.branches, 1):
+            kinds = Counter(str(each.kind) for each in branch.bifurcations)
+            found = ", ".join(f"{n} {kind}" for kind, n in kinds.items()) or "no bifurcation"
+            rows.append((f"branch {k}", f"{len(branch)} solutions, {branch.name} {range_text(branch.values)}, {found}"))
+        return tuple(rows) or (("branches", "none"),)
+
+
+def diagram(*branches: Branch | Diagram) -> Diagram:
+    """Put branches over one parameter together.
+
+    Parameters
+    ----------
+    *branches : Branch or Diagram
+        Branches of equilibria or of periodic orbits, or diagrams of them.
+
+    Returns
+    -------
+    Diagram
+        ``diagram(…).plot(y="maximum(x_1)")`` draws an observable of each solution over one period, full lines where the
+        solution is stable, dashed ones where it is not, and a mark at each bifurcation.
+
+    Raises
+    ------
+    ValueError
+        For branches over different parameters, and without any branch.
+    TypeError
+        For other values.
+
+    See Also
+    --------
+    follow : Follow a branch.
+
+    Examples
+    --------
+    >>> from synchain import Field, Scene, diagram, equilibrium, follow
+    >>> cell = Scene(Field({"x": "r*x - x**3"}, parameters={"r": -1}), initial={"x": 0})
+    >>> rest = follow(equilibrium(cell), "r", to=1)
+    >>> pitchfork = follow(rest.points["branch point"][0], "r", to=1)
+    >>> len(diagram(rest, pitchfork))
+    2
+    """
+    parts: list[Branch] = []
+    for each in branches:
+        if not isinstance(each, Branch | Diagram):
+            raise TypeError(f"diagram: found {typed_repr(each)}; expected branches, such as follow(…) returns")
+        parts += each.branches if isinstance(each, Diagram) else (each,)
+    names = sorted({each.name for each in parts})
+    if len(names) != 1:
+        raise ValueError(f"diagram: found branches over {', '.join(names) or 'no parameter'}; expected one parameter")
+    return Diagram(tuple(parts))
+
+
+@dataclass(frozen=True, slots=True)
+class CurvePoint:
+    """A point of codimension two on a curve, or one at which a parameter is extreme."""
+
+    kind: str  # "cusp", "Bogdanov-Takens", "Bautin", "zero-Hopf", "double Hopf"; "extreme p"
+    values: tuple[float, float]  # of both parameters
+    state: np.ndarray  # (states,)
+    frequency: float = 0.0  # of a Hopf point
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Curve(Labelled):
+    """A curve of bifurcations in two parameters.
+
+    Parameters
+    ----------
+    scene : Scene
+        Network with its other parameters.
+    kind : BifurcationKind
+        Kind of the bifurcations.
+    names : (str, str)
+        Names of the parameters.
+    values : ndarray, shape (k, 2)
+        Their values along the curve.
+    states : ndarray, shape (k, states)
+        Equilibria along the curve.
+    frequencies : ndarray, shape (k,)
+        Angular frequencies of Hopf points; 0 on curves of folds.
+    growing : ndarray of int, shape (k,)
+        Number of growing eigenvalues beside the critical ones.
+    special : tuple of CurvePoint
+        Points of codimension two and extremes of a parameter, in the order of the curve.
+    ends : tuple of str
+        Why the curve ends on both sides.
+
+    See Also
+    --------
+    follow : Follow a bifurcation in two parameters.
+    """
+
+    scene: Scene = field(repr=False)
+    kind: BifurcationKind
+    names: tuple[str, str]
+    values: np.ndarray
+    states: np.ndarray
+    frequencies: np.ndarray
+    growing: np.ndarray
+    special: tuple[CurvePoint, ...]
+    ends: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def points(self) -> Mapping[str, tuple[CurvePoint, ...]]:
+        """The special points by kind: `points["cusp"]`."""
+        kinds = dict.fromkeys(each.kind for each in self.special)
+        return {kind: tuple(each for each in self.special if each.kind == kind) for kind in kinds}
+
+    @property
+    def data(self) -> xr.Dataset:
+        """Both parameters, states and frequencies along the curve."""
+        columns = States.of(self.scene)
+        return dataset(
+            {
+                "state": (("point", *STATE), columns.table(self.states), "state at rest"),
+                "frequency": (("point",), self.frequencies, "angular frequency of Hopf points"),
+                "growing": (("point",), self.growing, "number of growing eigenvalues beside the critical ones"),
+            },
+            {
+                **{name: (("point",), self.values[:, k]) for k, name in enumerate(self.names)},
+                "component": list(columns.components),
+                "node": list(self.scene.topology.labels),
+            },
+            self.scene,
+        )
+
+    @property
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Rows of kind, ranges of both parameters, special points and ends."""
+        special = "; ".join(f"{each.kind} at {digits_of(each.values)}" for each in self.special)
+        return (
+            ("scene", scene_text(self.scene)),
+            ("curve", f"of {self.kind} points, {len(self)} solutions"),
+            *((name, range_text(self.values[:, k])) for k, name in enumerate(self.names)),
+            ("points", special or "none"),
+            ("ends", "; ".join(self.ends)),
+        )

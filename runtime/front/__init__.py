@@ -13,7 +13,7 @@
     universal_probe, basin                           strengths and starts that synchronise
     mismatch                                         errors of nearly equal nodes
     equilibrium, equilibria, periodic_orbit, follow,
-    skeleton                                         states at rest, orbits, their branches and bifurcations
+    diagram, skeleton                                states at rest, orbits, their branches and bifurcations
 
 The modules `graphs`, `observe`, `draw`, `export`, `plugins` and `results` hold the other names.  Each name is loaded
 when it is first used; editors read the names in the stubs beside this file.
@@ -45,6 +45,7 @@ HOMES = {
     "cluster_exponents": "runtime.stability.cluster_exponents",
     "compile": "runtime.sweeps.compiled",
     "critical": "runtime.synchronisation.critical",
+    "diagram": "runtime.bifurcation.results",
     "ends": "models.interactions.ends",
     "energy_terms": "models.scenes.energy",
     "energy_function": "runtime.results.energy_of_states",

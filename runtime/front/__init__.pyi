@@ -29,6 +29,7 @@ from synchain.runtime.bifurcation.branches import follow as follow
 from synchain.runtime.bifurcation.deflation import equilibria as equilibria
 from synchain.runtime.bifurcation.equilibrium import equilibrium as equilibrium
 from synchain.runtime.bifurcation.periodic import periodic_orbit as periodic_orbit
+from synchain.runtime.bifurcation.results import diagram as diagram
 from synchain.runtime.bifurcation.skeleton import skeleton as skeleton
 from synchain.runtime.engines.scene_kernels import kernel as kernel
 from synchain.runtime.results.energy_of_states import energy_function as energy_function

@@ -12,6 +12,8 @@ HOMES = {
     "CompiledResult": "runtime.sweeps.compiled",
     "CompiledRun": "runtime.sweeps.compiled",
     "Critical": "runtime.synchronisation.critical",
+    "Curve": "runtime.bifurcation.results",
+    "Diagram": "runtime.bifurcation.results",
     "Equilibrium": "runtime.bifurcation.equilibrium",
     "ExponentWindows": "runtime.synchronisation.exponent_windows",
     "Exponents": "runtime.stability.exponents",

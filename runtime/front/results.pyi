@@ -3,6 +3,8 @@ from synchain.runtime.bifurcation.equilibrium import Equilibrium as Equilibrium
 from synchain.runtime.bifurcation.periodic import PeriodicOrbit as PeriodicOrbit
 from synchain.runtime.bifurcation.results import Bifurcation as Bifurcation
 from synchain.runtime.bifurcation.results import Branch as Branch
+from synchain.runtime.bifurcation.results import Curve as Curve
+from synchain.runtime.bifurcation.results import Diagram as Diagram
 from synchain.runtime.bifurcation.skeleton import Skeleton as Skeleton
 from synchain.runtime.results.result import Result as Result
 from synchain.runtime.stability.cluster_exponents import ClusterExponents as ClusterExponents

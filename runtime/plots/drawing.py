@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from synchain.models.graphs.topology import Topology
@@ -17,7 +16,7 @@ from synchain.models.spectra.spectrum import Spectrum
 
 from ..bifurcation.equilibrium import Equilibrium
 from ..bifurcation.periodic import PeriodicOrbit
-from ..bifurcation.results import Branch
+from ..bifurcation.results import Branch, Curve, Diagram
 from ..bifurcation.skeleton import Skeleton
 from ..results.result import Result
 from ..stability.cluster_exponents import BlockVerdict, ClusterExponents
@@ -33,13 +32,13 @@ from ..synchronisation.probe import Probe
 from ..synchronisation.threshold import Thresholds
 from ..synchronisation.transition import Transition, TransitionCheck
 from .basin_plot import draw_basin
-from .branch_marks import MARK, MARKERS, STABLE, UNSTABLE
 from .canvas import axes_of, check_style, line_style
+from .diagram import draw_branches, draw_curve
 from .exponent import draw_exponent, finite
 from .graph_picture import ALONE, class_colours
 from .plane import draw_plane
 from .result_plot import draw_result
-from .style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, bands, note, symbol
+from .style import BLACK, BLUE, GREEN, GREY, ORANGE, bands, note, symbol
 
 SAMPLES = 400
 """Points per drive period of a drawn orbit: enough for a smooth curve."""
@@ -207,75 +206,23 @@ def _(value: PeriodicOrbit, axes: Axes, **style: Any) -> Axes:
 
 
 @_draw.register
-def _(value: Branch, axes: Axes, **style: Any) -> Axes:
-    return _branches((value,), axes, style)
+def _(value: Branch, axes: Axes, y: str | None = None, **style: Any) -> Axes:
+    return draw_branches(axes, (value,), y, style)
+
+
+@_draw.register
+def _(value: Diagram, axes: Axes, y: str | None = None, **style: Any) -> Axes:
+    return draw_branches(axes, value.branches, y, style)
 
 
 @_draw.register
 def _(value: Skeleton, axes: Axes, **style: Any) -> Axes:
-    return _branches(value.branches, axes, style)
+    return draw_branches(axes, value.branches, None, style)
 
 
-def _branches(branches: tuple[Branch, ...], axes: Axes, style: dict[str, Any]) -> Axes:
-    """Draw the first state at rest or at the start of a period: solid where stable, dashed where unstable."""
-    # one colour for equilibria and each number of drive periods; `legend` holds one entry for each style that is drawn
-    colours = (PURPLE, BLUE, ORANGE, GREEN)
-    kinds = sorted({_kind(branch) for branch in branches})
-    legend: dict[str, dict[str, Any]] = {
-        text: {"color": colours[k % len(colours)]} for k, (_, text) in enumerate(kinds)
-    }
-    for branch in branches:
-        colour = colours[kinds.index(_kind(branch)) % len(colours)]
-        for stable, values, states in stretches(branch):
-            axes.plot(values, states[:, 0], **line_style(style, color=colour, **(STABLE if stable else UNSTABLE)))
-            legend["stable" if stable else "unstable"] = {"color": BLACK, **(STABLE if stable else UNSTABLE)}
-        for turn in branch.bifurcations:
-            axes.plot([turn.value], [turn.solution.state[0]], color=colour, marker=MARKERS[turn.kind], **MARK)
-            legend[str(turn.kind)] = {"color": BLACK, "marker": MARKERS[turn.kind], **MARK}
-    if branches:
-        first = branches[0].solutions[0]
-        name = first.scene.equations.state[0] if isinstance(first, Equilibrium) else first.components[0]
-        when = "" if isinstance(first, Equilibrium) else " at the beginning of a period"
-        axes.set(xlabel=symbol(branches[0].name), ylabel=f"{symbol(name)}{when}")
-        handles = [Line2D([], [], label=label, **look) for label, look in legend.items()]
-        axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize="x-small")
-    return axes
-
-
-def _kind(branch: Branch) -> tuple[int, str]:
-    """Return the number of drive periods, 0 for equilibria, with the text of the legend."""
-    first = branch.solutions[0]
-    if isinstance(first, Equilibrium):
-        return 0, "equilibria"
-    return first.periods, f"{first.periods} drive period{'s' * (first.periods > 1)}"
-
-
-def stretches(branch: Branch) -> list[tuple[bool, np.ndarray, np.ndarray]]:
-    """Cut a branch at its bifurcations into stretches of one stability: stable or not, values, states."""
-    stable = branch.stable
-    points = [
-        (at, value, each.state, bool(good))
-        for at, value, each, good in zip(branch.lengths, branch.values, branch.solutions, stable, strict=True)
-    ]
-    # The place of a bifurcation on the branch is its arclength, or the parameter where that is the length.
-    turns = [
-        (t.value if np.isnan(t.length) else t.length, t.value, t.solution.state, None) for t in branch.bifurcations
-    ]
-    lines: list[tuple[bool, list[tuple[float, np.ndarray]]]] = []
-    ends: list[tuple[float, np.ndarray]] = []
-    for _, value, state, good in sorted([*points, *turns], key=lambda each: each[0]):
-        point = (value, state)
-        if good is None:
-            # the bifurcation ends this stretch and begins the next one
-            if lines and not ends:
-                lines[-1][1].append(point)
-            ends = [point]
-        elif not lines or ends or lines[-1][0] != good:
-            lines.append((good, [*ends, point]))
-            ends = []
-        else:
-            lines[-1][1].append(point)
-    return [(s, np.array([v for v, _ in line]), np.array([state for _, state in line])) for s, line in lines]
+@_draw.register
+def _(value: Curve, axes: Axes, **style: Any) -> Axes:
+    return draw_curve(axes, value, style)
 
 
 @_draw.register

@@ -230,3 +230,58 @@ def test_equilibria_of_machines_differ_by_more_than_turns_and_shifts() -> None:
     assert len(sc.equilibria(pair, 1)) == 1
     with pytest.raises(ValueError, match="equilibria: the range of delta is"):
         sc.equilibria(pair, ranges={"delta": (1, 0)})
+
+
+@pytest.mark.parametrize("twist", [1, 2, 3])
+def test_twisted_states_of_a_ring_of_phases(twist: int) -> None:
+    """Eigenvalues -K cos(2 pi q/n) lambda_k of the state theta_i = 2 pi q i/n."""
+    n, K = 9, 0.7
+    phase = sc.Field({"theta": "w"}, parameters={"w": 0})
+    pull = sc.Rates({"theta": "K*W*sin(theta_j - theta_i)"}, {"K": K})
+    start = {"theta": (2 * np.pi * twist / n * np.arange(n)).tolist()}
+    rest = sc.equilibrium(sc.Scene(phase, pull, sc.graphs.ring(n), initial=start))
+    modes = 2 - 2 * np.cos(2 * np.pi * np.arange(n) / n)
+    expected = np.sort(-K * np.cos(2 * np.pi * twist / n) * modes)
+    np.testing.assert_allclose(np.sort(rest.eigenvalues.real), expected, atol=1e-12)
+    assert rest.stable == (twist < n / 4)
+
+
+def test_a_double_hopf_point_has_rotating_and_standing_waves() -> None:
+    """A ring of four: a rotating wave, and a standing wave through nodes and one through links."""
+    node = sc.Field({"v": "v - v**3/3 - w + I", "w": "2/25*(v + 7/10 - 4/5*w)"}, parameters={"I": 0.35})
+    link = sc.Rates({"v": "D*W*(v_j - v_i)"}, {"D": 0.05})
+    scene = sc.Scene(node, link, sc.graphs.ring(4), initial={"v": -1.1, "w": -0.5})
+    double = sc.follow(sc.equilibrium(scene), "I", to=0.4).points["Hopf"][0]
+    amplitudes = sorted(np.sort(np.abs(v[:4]) / np.abs(v[:4]).max()).round(9).tolist() for v in double.vectors)
+    assert amplitudes == [[0, 0, 1, 1], [1, 1, 1, 1], [1, 1, 1, 1]]
+
+
+def test_a_large_network_without_blocks_folds() -> None:
+    """Of 2400 eigenvalues the 12 nearest to zero are computed: one passes where the parameter turns."""
+    n = 1200
+    power = 0.3 * (-1.0) ** np.arange(n)
+    power[:2] = 0.35, -0.35
+    scene = sc.Scene(MACHINE, LINE, sc.graphs.ring(n), parameters={"P": power.tolist(), "K": 2})
+    branch = sc.follow(sc.equilibrium(scene), "K", to=0.15)
+    (fold,) = branch.bifurcations
+    assert (str(fold.kind), branch.ends) == ("fold", ("K = 2",))
+    assert not branch.stable.any()
+
+
+def test_a_diagram_draws_observables_and_reads_as_its_branches(tmp_path: Path) -> None:
+    cell = sc.Scene(sc.Field({"x": "r*x - x**3"}, parameters={"r": -1}), initial={"x": 0})
+    rest = sc.follow(sc.equilibrium(cell), "r", to=1)
+    fork = sc.follow(rest.points["branch point"][0], "r", to=1)
+    both = sc.diagram(rest, sc.diagram(fork))
+    assert [len(each) for each in both] == [len(rest), len(fork)]
+    lines = [line for line in both.plot(y="maximum(x_1**2)").lines if len(line.get_xdata()) > 1]
+    assert {line.get_linestyle() for line in lines} == {"-", "--"}
+    for line in lines:
+        across, up = np.array(line.get_xdata()), np.array(line.get_ydata())
+        np.testing.assert_allclose(up, 0.0 if not up.any() else across, atol=1e-9)
+    both.save(tmp_path / "both.nc")
+    assert [len(each) for each in sc.open_result(tmp_path / "both.nc")] == [len(rest), len(fork)]
+    with pytest.raises(ValueError, match="diagram: found branches over no parameter; expected one parameter"):
+        sc.diagram()
+    with pytest.raises(TypeError, match="diagram: found 3"):
+        sc.diagram(3)

@@ -7,7 +7,7 @@ import pytest
 
 import synchain as sc
 from synchain.runtime.bifurcation.skeleton import near_returns, starts_of
-from synchain.runtime.plots.drawing import stretches
+from synchain.runtime.plots.diagram import stretches
 
 DUFFING = sc.Field(
     {"x": "k*s/r*v", "v": "k*r*(F*cos(k*w*t) - v/r/10 + (x - c)/s - ((x - c)/s)**3)"},
@@ -17,6 +17,13 @@ UNITS = [(1e-9, 0, 1, 1e-9), (1e6, 0, 1e3, 1e3), (1e-4, 1, 1, 1e-4), (1, 0, 1e6,
 NODE = sc.Field(
     {"x": "v", "v": "-d*v - a*x + b*x**2 - c*x**3 + u*cos(w*t)"}, parameters={"u": 1, **dict.fromkeys("abcdw", 1)}
 )
+
+
+def lines_of(branch: sc.results.Branch) -> list[tuple[bool, np.ndarray, np.ndarray]]:
+    """The stretches of a branch, by the first state."""
+    return stretches(
+        branch, [each.state[0] for each in branch], [each.solution.state[0] for each in branch.bifurcations]
+    )
 
 
 def duffing(s: float = 1, c: float = 0, k: float = 1, r: float = 1) -> sc.Scene:
@@ -113,7 +120,7 @@ def test_lines_of_a_branch_end_at_its_bifurcations_and_are_of_one_stability(
     plain: tuple[sc.results.PeriodicOrbit, sc.results.Branch],
 ) -> None:
     branch = plain[1]
-    (line,) = stretches(branch)
+    (line,) = lines_of(branch)
     assert line[0] is True
     np.testing.assert_array_equal(line[1], [0.08, 0.1, branch.bifurcations[0].value])
     orbit = branch.orbits[0]
@@ -127,7 +134,7 @@ def test_lines_of_a_branch_end_at_its_bifurcations_and_are_of_one_stability(
         np.array([0, 0, 1, 1]),
         np.array([0.08, 0.1, 0.12, 0.14]),
     )
-    first, second = stretches(crossed)
+    first, second = lines_of(crossed)
     np.testing.assert_array_equal(first[1], [0.08, 0.1, turn.value])
     np.testing.assert_array_equal(second[1], [turn.value, 0.12, 0.14])
     assert (first[0], second[0]) == (True, False)
