@@ -24,8 +24,8 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--kind",
         metavar="KIND",
-        help="of a run: error, section, map, time, phase, space, network, end, or an observable (default: the first "
-        "that its records allow)",
+        help="of a run: error, section, map, time, phase, space, network, end, or an observable; of a basin: image, "
+        "shares, starts (default: the first that there are numbers for)",
     )
     parser.add_argument(
         "-o", "--out", metavar="PICTURE", help="a .png, .svg or .pdf file (default: FILE with the ending .png)"
@@ -38,6 +38,7 @@ def execute(arguments: Namespace) -> int:
     from ..results.open import open_result
     from ..results.result import Result
     from ..support.files import whole_file
+    from ..synchronisation.basin import Basin
 
     path = Path(arguments.file)
     target = path.with_suffix(".png") if arguments.out is None else Path(arguments.out)
@@ -46,7 +47,7 @@ def execute(arguments: Namespace) -> int:
             value = open_result(path)
         except ModuleNotFoundError as problem:
             raise Failed(sentence(problem)) from problem
-        if arguments.kind is not None and not isinstance(value, Result):
+        if arguments.kind is not None and not isinstance(value, Result | Basin):
             raise WrongUse(f"--kind: {path} holds a {type(value).__name__}, which has one kind of plot; leave it out")
         options = {} if arguments.kind is None else {"kind": arguments.kind}
         with off_screen() as (figure, axes):
