@@ -159,7 +159,8 @@ def _check(graphs: Sequence[Matrix]) -> None:
             if matrices[j] * first != first * matrices[j]:
                 raise ValueError(
                     f"joint spectrum of {graphs[j].name}({sizes[0]}) and {graphs[i].name}({sizes[0]}): found matrices that do "
-                    "not commute; expected graphs with common modes, such as any undirected graph and a complete one"
+                    "not commute; expected graphs with common modes, such as any undirected graph and a complete one; "
+                    "cluster_exponents takes other layers, with one cluster of all nodes for complete synchronisation"
                 )
 
 

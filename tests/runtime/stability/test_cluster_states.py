@@ -108,8 +108,8 @@ def numbers(entries: dict, values: dict, size: int) -> mpmath.matrix:
 ONE_WAY = from_matrix(np.kron(np.eye(2, dtype=int), [[-1, 1, 0], [0, -2, 2], [3, 0, -3]]).tolist())
 """Two one-way rings of three, side by side: equal places form three clusters whose one block is not symmetric."""
 
-PANEL = from_matrix([[-4, 1, 1, 1, 1], [1, -4, 1, 1, 1], [2, 2, -6, 1, 1], [2, 2, 1, -6, 1], [2, 2, 1, 1, -6]])
-"""A pair and a triple: nodes feel one neighbour in the pair, and two in the triple."""
+PANEL = from_matrix([[-6, 3, 1, 1, 1], [3, -6, 1, 1, 1], [2, 2, -6, 1, 1], [2, 2, 1, -6, 1], [2, 2, 1, 1, -6]])
+"""A pair and a triple: nodes feel the weight 3 in the pair, and 2 in the triple."""
 
 LORENZ = {"oscillator": "lorenz", "coupling": "x->x, 1/2 y->z"}
 NODE, OTHER = (
