@@ -172,6 +172,21 @@ def test_the_first_lyapunov_coefficient_of_a_normal_form(sign: int) -> None:
     assert hopf.lyapunov == pytest.approx(2 * 2 * float(c) / (2 * w), abs=1e-9)
 
 
+def test_the_first_lyapunov_coefficient_of_a_plane_with_quadratic_terms() -> None:
+    """The formula of Guckenheimer & Holmes (Springer, 1983), equation (3.4.11), for x' = -w y + f, y' = w x + g."""
+    x, y = sp.symbols("x y", real=True)
+    w, f, g = 3, x**2 / 2 - x * y / 3 + y**2 / 5 + x**3 / 7, x * y + x**2 / 4 - y**2 / 2 - x**2 * y / 6
+    d = lambda e, *by: sp.diff(e, *by).subs({x: 0, y: 0})  # noqa: E731
+    cubic = d(f, x, x, x) + d(f, x, y, y) + d(g, x, x, y) + d(g, y, y, y)
+    mixed = d(f, x, y) * (d(f, x, x) + d(f, y, y)) - d(g, x, y) * (d(g, x, x) + d(g, y, y))
+    squares = d(f, x, x) * d(g, x, x) - d(f, y, y) * d(g, y, y)
+    expected = float(cubic / 16 + (mixed - squares) / (16 * w))  # of r' = a r^3
+    node = sc.Field({"x": f"b*x - {w}*y + {f}", "y": f"{w}*x + b*y + {g}"}, parameters={"b": -0.1})
+    branch = sc.follow(sc.equilibrium(sc.Scene(node, None, initial={"x": 0, "y": 0})), "b", to=0.1)
+    hopf = min(branch.points["Hopf"], key=lambda each: abs(each.value))
+    assert hopf.lyapunov == pytest.approx(2 * expected / w, rel=1e-8)
+
+
 def test_blocks_of_modes_and_the_whole_matrix_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     first = sc.equilibrium(brusselators(8))
     by_blocks = sc.follow(first, "B", to=5.6)
