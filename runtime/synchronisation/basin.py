@@ -505,7 +505,7 @@ def _motion(
     def measure(atol: float | None) -> SynchronousMotion:
         # all oscillators start alike, so that one of them is integrated where the network allows
         start = {name: values[0] for name, values in scene.initial.items() if name not in scene.equations.modes}
-        unit = scene.replace(initial=start, transient=1.0, window=1.0, atol=atol or scene.given["atol"])
+        unit = scene.replace(initial=start, transient=1.0, window=1.0, t_eval=None, atol=atol or scene.given["atol"])
         reduction, equations = reduce_scene(unit.replace(record=("sync_error",))), scene.equations
         first, times = Planner(unit).rows(np.arange(1)), (partial.transient, partial.window)
         with Trials.of(reduction, execution) as trials:

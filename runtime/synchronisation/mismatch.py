@@ -32,6 +32,7 @@ from ..cells.run_keywords import Given
 from ..results.labelled import Labelled, dataset
 from ..stability.exponents import exponents
 from ..support.error_text import with_error
+from ..support.execution import Execution
 from ..support.progress import Hook
 from ..sweeps.run import run
 
@@ -165,6 +166,7 @@ def mismatch(
     >>> round(float(sc.mismatch(pair).deviation[0]), 8)  # 0.1/(1 + 2 sigma)
     0.05
     """
+    Execution(workers, executor, show_progress, progress)  # refuses wrong options before the exponents are computed
     scene = Given(mismatch, parameters, more).scene(scene)
     equal, values = _mean_scene(scene)
     names = tuple(values)
