@@ -107,7 +107,7 @@ def transition() -> Transition:
 def every_kind() -> dict[str, Labelled]:
     """One value of each kind, by the name of its class."""
     alpha = np.linspace(0.0, 1.0, 5)
-    state = clusters(topology("chain", 4), [0, 1, 1, 0])
+    state = clusters(topology("ring", 10), [0, 1] * 5)  # its blocks hold irrational numbers
     values = (
         exponents_on(alpha + 0.1j),
         MSF(PAIR, alpha, exponents_on(np.linspace(0.0, 1.0, 21))),
@@ -133,7 +133,7 @@ def every_kind() -> dict[str, Labelled]:
             2,
         ),
         ClusterExponents(
-            state, np.array([-0.1]), np.array([0.01]), 0.0, 0.01, np.array([[0.0, 0.5], [0.5, 0.0]]), 20.0
+            state, np.array([-0.1, 0.1]), np.full(2, 0.01), 0.0, 0.01, np.array([[0.0, 0.5], [0.5, 0.0]]), 20.0
         ),
         orbit_at(1.2),
         Equilibrium(

@@ -27,7 +27,7 @@ from flint import arb, fmpq, fmpq_mat, fmpq_poly, nmod_mat, nmod_poly
 
 from ..algebra.balls import Ball, nearest, precision
 from ..algebra.rationals import to_flint, to_fraction
-from ..algebra.roots import Root, roots
+from ..algebra.roots import RealRoot, roots
 from ..spectra.eigenvalue import ProofError
 
 ENOUGH, ELEMENTS = 2, 6
@@ -47,7 +47,7 @@ class FieldNumber:
     """A number of Q(θ), a polynomial in the real algebraic number θ; `float(number)` is the nearest float."""
 
     coefficients: tuple[Fraction, ...]  # of 1, θ, θ² …
-    root: Root  # θ
+    root: RealRoot  # θ
     value: float = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -68,7 +68,7 @@ class FieldNumber:
         return f"{self.value:.16g}"
 
 
-Exact: TypeAlias = "Fraction | FieldNumber"
+Exact: TypeAlias = Fraction | FieldNumber
 """An exact real number; `float(number)` is the nearest float."""
 
 
@@ -225,7 +225,7 @@ def _restricted(generator: Generator, basis: fmpq_mat) -> Generator:
     return Generator(inside(generator.matrix), inside(generator.adjoint))
 
 
-def _exact(polynomial: Polynomial, root: Root | None) -> Exact:
+def _exact(polynomial: Polynomial, root: RealRoot | None) -> Exact:
     """Return a Fraction for a rational number, else a number of the field of the root."""
     coefficients = tuple(map(to_fraction, polynomial.coeffs()))
     if len(coefficients) < 2 or root is None:
@@ -312,7 +312,7 @@ class _Field:
                 rows[pivot] = [self.times(scale, x) for x in vector]
         return len(matrix) - len(rows)
 
-    def conjugate_roots(self, generic: list[list[Polynomial]], count: int) -> list[Root | None]:
+    def conjugate_roots(self, generic: list[list[Polynomial]], count: int) -> list[RealRoot | None]:
         """Return one root θ for each of `count` subspaces that are not equivalent; None for a rational field.
 
         `generic`: a generic element in the coordinates of the subspace.
@@ -321,7 +321,8 @@ class _Field:
             return [None]
         coefficients = [int(c) for c in self.polynomial.numer().coeffs()]
         content = gcd(*coefficients)
-        all_roots = roots(tuple(c // content for c in coefficients))
+        # The polynomial divides that of a self-adjoint element: all its roots are real.
+        all_roots = [root for root in roots(tuple(c // content for c in coefficients)) if isinstance(root, RealRoot)]
         if count == 1:
             return [all_roots[0]]
         # A generic element has equal traces of all powers on equivalent subspaces, and only there.
@@ -330,7 +331,7 @@ class _Field:
             trace += sum((power[r][r] for r in size), self.zero) * fmpq(1, 3 + 5 * k)
             products = [[[self.times(power[r][q], generic[q][c]) for q in size] for c in size] for r in size]
             power = [[sum(terms, self.zero) for terms in row] for row in products]
-        kinds: dict[str, Root | None] = {}
+        kinds: dict[str, RealRoot | None] = {}
         for root in all_roots:
             kinds.setdefault(f"{float(_exact(trace % self.polynomial, root)):.12e}", root)
         if len(kinds) != count:

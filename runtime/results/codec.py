@@ -99,6 +99,8 @@ class _Writer:
         raise TypeError(f"{path}: found {type(value).__name__}; expected numbers, arrays, texts or frozen values")
 
     def _array(self, values: np.ndarray, path: str) -> Tree:
+        if not values.size:  # netCDF-3 has no dimension of length 0
+            return {"empty": values.shape, "dtype": values.dtype.str}
         labelled = self.data.get(path)
         if (
             labelled is None
@@ -128,6 +130,7 @@ class _Reader:
         readers: dict[str, Callable[[], Any]] = {
             "array": lambda: np.array(self.data[part].values, dtype=np.dtype(tree["dtype"])),
             "complex": lambda: complex(*part),
+            "empty": lambda: np.zeros(part, dtype=np.dtype(tree["dtype"])),
             "enum": lambda: self.classes[part[0]](part[1]),
             "fraction": lambda: Fraction(part),
             "graph": lambda: graph_of(part),
