@@ -85,7 +85,6 @@ class Recording:
     """The records of a kernel, and the functions of the state that it evaluates inside steps for them."""
 
     records: tuple[str, ...] = ("sync_error",)  # words of `Record`
-    own_times: bool = False  # whether the samples of the trajectory are at given times, not equally spaced
     section: sp.Expr | None = None  # section function of the record "section", whose points are whole states
     # values that are tallied over the window (`synchain.models.dynamics.observable`)
     observed: tuple[sp.Expr, ...] = ()
@@ -94,6 +93,7 @@ class Recording:
     stop: sp.Expr | None = None  # a function that ends a cell when it passes zero
     sums: tuple[ObservableRows, ...] = ()  # the rows that the `RowSum`s of these functions add up
     multiplicity: tuple[int, ...] | None = None  # oscillators that each node represents in the synchronisation error
+    own_times: bool = False  # whether the samples of the trajectory are at given times, not equally spaced
 
     def check(self, equations: Equations) -> None:
         """Raise ValueError for records that are unknown, lack an argument or exclude each other."""
