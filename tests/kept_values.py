@@ -13,7 +13,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.models.symmetries.clusters import clusters
 from synchain.runtime.bifurcation.equilibrium import Equilibrium
 from synchain.runtime.bifurcation.kinds import BifurcationKind
-from synchain.runtime.bifurcation.periodic import PeriodicOrbit
+from synchain.runtime.bifurcation.periodic_result import PeriodicOrbit
 from synchain.runtime.bifurcation.phases import Phases
 from synchain.runtime.bifurcation.results import Bifurcation, Branch
 from synchain.runtime.bifurcation.skeleton import Skeleton

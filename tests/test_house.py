@@ -58,7 +58,7 @@ ARROWS = {
     "runtime.results": "engines cells support codegen models",
     "runtime.sweeps": "stability results engines prediction cells support codegen models",
     "runtime.synchronisation": "sweeps stability results engines prediction cells support codegen models",
-    "runtime.bifurcation": "sweeps stability results cells support models",
+    "runtime.bifurcation": "sweeps stability results engines cells support codegen models",
     "runtime.plots": "bifurcation synchronisation sweeps stability results prediction support models",
     "runtime.reports": "plots sweeps stability results engines models",
     "runtime.paper": "plots bifurcation synchronisation sweeps stability results prediction support models",

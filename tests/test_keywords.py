@@ -286,7 +286,8 @@ def test_branches_follow_parameters_with_the_names_of_keywords() -> None:
     scene = Scene(node, "x->x", transient=30.0)
     first = synchain.periodic_orbit(scene, parameters={"start": 0.1})
     branch = synchain.follow(first, "start", values=[0.1, 0.2])
-    np.testing.assert_allclose([orbit.state[1] for orbit in branch.orbits], [0.1, 0.2], atol=1e-9)
+    assert branch.values[[0, -1]].tolist() == [0.1, 0.2]
+    np.testing.assert_allclose([orbit.state[1] for orbit in branch.orbits], branch.values, atol=1e-9)
 
 
 def test_mapping_and_keywords_say_the_same() -> None:

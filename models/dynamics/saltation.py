@@ -54,6 +54,7 @@ class _Release:
     gradient: tuple[sp.Expr, ...]  # derivatives by the positions of the limit h of the load, at which slip begins
     alone: sp.Expr  # derivative by the position of the contact of the limit h without links
     lead: sp.Expr  # change of the velocity of a deviation divided by the change of h
+    limit: sp.Expr  # h
 
 
 def _releases(orbit: Equations) -> tuple[tuple[_Release, _Release], ...]:
@@ -77,7 +78,7 @@ def _releases(orbit: Equations) -> tuple[tuple[_Release, _Release], ...]:
             gradient = tuple(derivative(limit, x) for x in positions)
             moved = sp.Add(derivative(limit, TIME), *(g * v for g, v in zip(gradient, rates, strict=True)))
             alone = derivative(limit_alone, orbit.node.state[0]).xreplace(orbit.at_node(i))
-            sides.append(_Release(gradient, alone, departure / moved))
+            sides.append(_Release(gradient, alone, departure / moved, limit))
         releases.append((sides[0], sides[1]))
     return tuple(releases)
 
@@ -131,18 +132,25 @@ def of_mode(
     return Events((-1, 0, -1, 0) if plane else (-1, 0), tuple((entries(up), entries(down)) for up, down in releases))
 
 
-def of_network(equations: Equations) -> Events | None:
-    """Return the events of all contacts of a network: row n + i is the velocity of node i."""
+def of_network(equations: Equations, names: Sequence[str] = ()) -> Events | None:
+    """Return the events of all contacts of a network: row n + i is the velocity of node i relative to its ground.
+
+    Row 2 n + k is the deviation of the k-th parameter of `names`, which moves the limits of the load.
+    """
     n = equations.n
     if not equations.sticks:
         return None
     check_tangents(equations)
 
     def entries(i: int, side: _Release) -> tuple[Entry, ...]:
-        return tuple(((n + i, j), side.lead * g) for j, g in enumerate(side.gradient) if g != 0)
+        slopes = (*((j, g) for j, g in enumerate(side.gradient)), *((2 * n + k, g) for k, g in by_names(side.limit)))
+        return tuple(((n + i, column), side.lead * g) for column, g in slopes if g != 0)
+
+    def by_names(limit: sp.Expr) -> Iterable[tuple[int, sp.Expr]]:
+        return enumerate(derivative(limit, sp.Symbol(name, real=True)) for name in names)
 
     exits = tuple((entries(i, up), entries(i, down)) for i, (up, down) in enumerate(_releases(equations)))
-    return Events((*[-1] * n, *range(n)), exits)
+    return Events((*[-1] * n, *range(n), *[-1] * len(names)), exits)
 
 
 def of_slots(

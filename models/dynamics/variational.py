@@ -98,8 +98,10 @@ def expect_continuous(orbit: Equations) -> None:
             )
 
 
-def mode(equations: Equations, plane: bool = False) -> Variation:
+def mode(equations: Equations, plane: bool = False, by_weight: bool = False) -> Variation:
     """Return the variational equation of one transversal mode along the synchronous orbit.
+
+    With `by_weight` the strength is alpha = -gamma: links may have any parameters, but no inertia.
 
     A deviation along an eigenvector of G with eigenvalue gamma obeys d' = (J - alpha H) d with alpha = -sigma gamma.
     J is the Jacobian of one node; `source_slopes` returns H.
@@ -116,7 +118,7 @@ def mode(equations: Equations, plane: bool = False) -> Variation:
     """
     equations = equations.projected
     node = synchronous_node(equations)
-    slopes = source_slopes(equations)
+    slopes = source_slopes(equations, by_weight)
     if node is not equations.node and (equations.inertial or equations.sticks):
         raise ValueError(
             "a link acts between equal states; expected links without inertia between nodes without set-valued friction"
@@ -142,12 +144,25 @@ def mode(equations: Equations, plane: bool = False) -> Variation:
     return Variation(orbit, 2 * size, _entries(both), (*alphas, *betas), events)
 
 
-def network_variation(equations: Equations) -> Variation:
-    """Return the variational equation of the whole network, d' = J d."""
+def network_variation(equations: Equations, names: Sequence[str] = ()) -> Variation:
+    """Return the variational equation of the whole network, d' = J d, and of the derivatives by some parameters.
+
+    The deviations of the parameters `names` follow those of the states and stay constant. With set-valued friction the
+    deviation of a velocity is relative to the ground, whose velocity may depend on the parameters: it is zero in stick.
+    """
     equations.expect_alike("variational equation of the whole network", varied_too=True, layers_too=True)
     size = equations.n * len(equations.node.continuous)
-    matrix = tuple((key, e) for key, e in equations.jacobian().items() if max(key) < size)
-    return Variation(equations, size, matrix, (), of_network(equations))
+    entries = {key: e for key, e in equations.jacobian().items() if max(key) < size}
+    grounds = [event.target for i in range(equations.n) for event in equations.events_at(i)] if names else []
+    for column, name in enumerate(names, size):
+        p = sp.Symbol(name, real=True)
+        moved = {equations.n + i: derivative(target, p) for i, target in enumerate(grounds)}
+        for row, e in enumerate(equations.rhs()[:size]):
+            by_grounds = (entries[row, k] * speed for k, speed in moved.items() if (row, k) in entries)
+            slope = sp.Add(derivative(e, p), *by_grounds)
+            if slope != 0:
+                entries[row, column] = slope
+    return Variation(equations, size + len(names), tuple(sorted(entries.items())), (), of_network(equations, names))
 
 
 @dataclass(frozen=True, slots=True)
@@ -342,22 +357,24 @@ def _entries(matrix: sp.Matrix) -> tuple[Entry, ...]:
     return tuple(((r, c), matrix[r, c]) for r in range(rows) for c in range(columns) if matrix[r, c] != 0)
 
 
-def source_slopes(equations: Equations) -> tuple[sp.Matrix, ...]:
+def source_slopes(equations: Equations, by_weight: bool = False) -> tuple[sp.Matrix, ...]:
     """Return H of each layer: the derivative of a link of weight 1 by the state at its source, divided by the strength.
 
-    The strength is sigma, or the only parameter that is a factor of the whole link.
+    The strength is sigma, or the only parameter that is a factor of the whole link; 1 with `by_weight`.
     """
-    equations, several = equations.projected, len(equations.layers) > 1
-    equations.expect_alike("transversal modes of complete synchronisation", inertia_too=not several, layers_too=True)
+    several, what = len(equations.layers) > 1, "transversal modes of complete synchronisation"
+    equations = equations.projected
+    equations.expect_alike(what, inertia_too=not (several or by_weight), layers_too=True)
     if not equations.layers:
         raise ValueError("these equations have no coupling; a transversal mode needs links")
-    slopes = tuple(_source_slope(edge, equations.node) for layer in equations.layers for _, edge in layer.edge_of)
-    return slopes if several else (effective_slope(equations, slopes[0]),)
+    edges = [edge for layer in equations.layers for _, edge in layer.edge_of]
+    slopes = tuple(_source_slope(edge, equations.node, by_weight) for edge in edges)
+    return slopes if several or by_weight else (effective_slope(equations, slopes[0]),)
 
 
-def _source_slope(edge: Edge, node: Node) -> sp.Matrix:
+def _source_slope(edge: Edge, node: Node, by_weight: bool) -> sp.Matrix:
     """Return H of one layer, without inertia."""
-    sigma = strength(edge, node.parameters)
+    sigma = sp.S.One if by_weight else strength(edge, node.parameters)
     equal = _check_smooth(edge, node)
     # The derivative must be sigma W H(s), where W is the weight: then sigma gamma is the strength of a mode.
     weighted = sp.Matrix(edge.jacobian_there()).xreplace(equal)
@@ -367,7 +384,7 @@ def _source_slope(edge: Edge, node: Node) -> sp.Matrix:
         raise ValueError(
             "links are not proportional to their weight; the modes of the graph are no modes of the network"
         )
-    slope = matrix.diff(sigma)
+    slope = matrix if by_weight else matrix.diff(sigma)
     if (matrix - sigma * slope).applyfunc(sp.simplify) != zero:
         raise ValueError(f"links are not proportional to {sigma}; a mode has no single strength alpha")
     if slope.has(TIME):

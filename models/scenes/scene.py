@@ -308,6 +308,40 @@ class Scene(HasDrawing, HasLatex):
         return tuple(value for values in self.initial.values() for value in values)
 
     @property
+    def lone(self) -> Scene:
+        """The first oscillator without links: its parameters, its start and the settings of the scene.
+
+        >>> from synchain import Scene
+        >>> from synchain.graphs import chain
+        >>> Scene("van_der_pol", "spring", chain(5), initial={"x": [1, 2, 3, 4, 5]}).lone.y0
+        (1.0, 0.0)
+        """
+        kind = self.equations.kind_of[0]
+        node, names = self.equations.nodes[kind], {s.name for s in self.equations.nodes[kind].parameters}
+        kept = [
+            "friction",
+            "contact",
+            "transient",
+            "window",
+            "time_unit",
+            "integrator",
+            "rtol",
+            "atol",
+            "max_steps",
+            "seed",
+        ]
+        return Scene(
+            self.model.kinds[kind].oscillator,
+            None,
+            parameters={
+                name: self.parameters[str(NodeName(name, 0)) if name in self.varied else name] for name in sorted(names)
+            },
+            initial={s.name: self.initial[s.name][0] for s in node.continuous},
+            record=(),
+            **{name: self.given[name] for name in kept},
+        )
+
+    @property
     def shape(self) -> tuple[int, ...]:
         """Number of cells along each dimension of the sweep, realisations last; zipped axes are one dimension."""
         lengths = tuple(len(axis) for axis in self.axes)

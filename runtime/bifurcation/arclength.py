@@ -30,6 +30,9 @@ from .problems import Critical, Matrix, Problem
 MOST_CORRECTIONS = 12
 """Most corrections of a step (a choice)."""
 
+STALLED = 100.0
+"""Largest residual of a solution in units of rounding, where Newton's method has stalled (a choice)."""
+
 CLOSE = 1e-11
 """A solution is accepted after a correction of this length; the next would be its square (a choice)."""
 
@@ -38,6 +41,12 @@ FEW, MANY, LONGER, SHORTER = 3, 5, 1.4, 0.7
 
 ANGLE = math.cos(math.radians(25.0))
 """Cosine of the largest angle between the tangents at both ends of a step (a choice)."""
+
+ASIDE = 0.03
+"""Largest correction, relative to the step, of a step that does not turn; a larger one leads to another branch (a choice)."""
+
+KINK = 1.0 / 64.0
+"""Longest step across a kink of the branch (a choice)."""
 
 SHORTEST = 1e-9
 """Shortest step; the branch is lost if it must be shorter (a choice)."""
@@ -102,14 +111,16 @@ def correct(problem: Problem, guess: np.ndarray, tangent: np.ndarray) -> Point |
     A tangent with a single entry keeps that unknown fixed.
     """
     weights = problem.weights
-    row, z, last = weights**2 * tangent, guess, math.inf
+    row, z, last, stalled = weights**2 * tangent, guess, math.inf, False
     column = int(np.argmax(np.abs(weights * tangent)))
     for count in range(MOST_CORRECTIONS):
         try:
             residual, matrix = problem.linearise(z)
         except ArithmeticError:
             return None
-        solved = last < CLOSE or bool(np.all(np.abs(residual) <= problem.noise(z)))
+        # Where steps no longer shrink the residual is rounding, if it is as small as that.
+        noise = problem.noise(z) * (STALLED if stalled else 1.0)
+        solved = last < CLOSE or bool(np.all(np.abs(residual) <= noise))
         try:
             factors = Factors(matrix, column)
             null = factors.null()
@@ -125,7 +136,7 @@ def correct(problem: Problem, guess: np.ndarray, tangent: np.ndarray) -> Point |
         size = float(np.linalg.norm(weights * step))
         if not size < 10.0 * last:
             return None
-        z, last = z + step, size
+        z, last, stalled = z + step, size, size > 0.3 * last
     return None
 
 
@@ -185,7 +196,7 @@ def _advance(
         length, end = step, ""
         weights = problem.weights
         # A branch leaves a bifurcation in a direction of which the vector there is a part.
-        straight = after is None or (weights * after.tangent) @ (weights * before.tangent) > ANGLE
+        straight = after is None or _fits(weights, before, after, step) or (problem.kinked and step < KINK)
         if after is not None and (straight or before.critical is None):
             passed = _passed(after.z, limits.bounds)
             if passed is not None:  # end on the bound
@@ -209,6 +220,14 @@ def _advance(
                     return after, located, length, end
         step *= 0.5
     return None
+
+
+def _fits(weights: np.ndarray, before: Point, after: Point, step: float) -> bool:
+    """Return whether two solutions lie on one smooth branch: the step bends as its tangents turn."""
+    cosine = float((weights * after.tangent) @ (weights * before.tangent))
+    # On an arc of a circle the correction is the step times the tangent of half the angle.
+    aside = float(np.linalg.norm(weights * (after.z - before.z - step * before.tangent))) / step
+    return cosine > ANGLE and aside < math.tan(math.acos(min(1.0, cosine))) + ASIDE
 
 
 def _passed(z: np.ndarray, bounds: Sequence[tuple[float, float]]) -> tuple[int, float] | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from numbers import Real
 from typing import Literal, overload
 
 import numpy as np
@@ -19,14 +20,15 @@ from synchain.models.inputs.names import expect_free
 from synchain.models.scenes.scene import Scene
 
 from .arclength import FIRST_STEP, LARGEST_STEP, MOST, Limits, Point, correct, walk
+from .corners import Corner, Corners, cycle_bifurcations
 from .curves import follow_curve
+from .cycles import Cycles
 from .detection import Located, bifurcations
 from .equilibria import Equilibria
 from .equilibrium import Equilibrium, resting_equations
 from .kinds import BifurcationKind
 from .normal_forms import first_lyapunov_coefficient
-from .orbit_tracer import checked_values, traced
-from .periodic import PeriodicOrbit
+from .periodic_result import PeriodicOrbit
 from .results import NAMES, Bifurcation, Branch, Curve, digits_of
 from .switching import directions
 
@@ -34,6 +36,15 @@ Direction = Literal["both", "up", "down"]
 
 SIGNS: Mapping[str, tuple[float, ...]] = {"both": (-1.0, 1.0), "up": (1.0,), "down": (-1.0,)}
 """Signs of the first step of the parameter for each direction."""
+
+Part = tuple[list[tuple[Point, Equilibrium | PeriodicOrbit]], list[Bifurcation], str]
+"""The points of a branch in one direction with their solutions, the bifurcations, and how it ends."""
+
+BORN = (BifurcationKind.HOPF, BifurcationKind.PERIOD_DOUBLING)
+"""Where cycles are born."""
+
+LEFT = (BifurcationKind.BRANCH_POINT, BifurcationKind.FOLD)
+"""Where a branch leaves to both sides."""
 
 
 @overload
@@ -152,12 +163,6 @@ def follow(
     solution = first.solution if isinstance(first, Bifurcation) else first
     scene = solution.scene
     _check_name(scene, name)
-    if isinstance(first, Bifurcation) and first.kind is BifurcationKind.HOPF:
-        raise ValueError(
-            "follow: found a Hopf point; expected an equilibrium, a fold or a branch point; its `solution` is the equilibrium"
-        )
-    if not isinstance(solution, Equilibrium):
-        return _along_orbits(solution, name, to, values)
     bounds, requested = _bounds(scene, name, to, values, within)
     begin = scene.parameters[name]
     # The range of the parameter is its unit of length.
@@ -170,15 +175,52 @@ def follow(
     if to is not None:
         direction = "up" if to > begin else "down"
     signs = SIGNS[direction]
-    parts = []
-    for sign in signs if not _leaves(first) else (-1.0, 1.0):
-        problem = Equilibria(
-            scene, resting_equations("follow", scene), (name,), solution.state, solution.shifts, solution.speeds
-        )
-        problem.set_ranges(np.array([size]))
-        start = _start(problem, first if isinstance(first, Bifurcation) else None, sign, vector)
-        parts.append(_trace(problem, start, limits))
+    if len(signs) == 2:  # a first solution on a bound is followed inwards
+        signs = tuple(sign for sign, bound in zip(signs, bounds, strict=True) if begin != bound) or signs
+    if isinstance(first, Bifurcation) and first.kind in BORN:
+        # The cycles that are born there go to one side; the other is the same cycles, shifted in time.
+        signs = (1.0,)
+    elif isinstance(first, Bifurcation) and first.kind in LEFT:
+        signs = (-1.0, 1.0)
+    parts = [_trace(*_begin(first, name, sign, vector, size), limits) for sign in signs]
     return _joined(name, parts)
+
+
+def _begin(
+    first: Equilibrium | PeriodicOrbit | Bifurcation, name: str, sign: float, vector: int, size: float
+) -> tuple[Equilibria | Cycles, Point]:
+    """Return the problem of a branch and its first point, without critical values where it leaves a bifurcation."""
+    leaves = isinstance(first, Bifurcation) and first.kind in {*BORN, *LEFT}
+    if isinstance(first, Bifurcation) and leaves and not 0 <= vector < len(first.vectors):
+        raise ValueError(f"vector: found {vector}; expected a number below {len(first.vectors)}")
+    problem: Equilibria | Cycles
+    solution = first.solution if isinstance(first, Bifurcation) else first
+    if isinstance(solution, Equilibrium):
+        if isinstance(first, Bifurcation) and first.kind is BifurcationKind.HOPF:
+            problem, point = Cycles.at_hopf(solution, name, first.vectors[vector], first.frequency)
+            problem.set_ranges(np.array([size]))
+            return problem, point
+        equations = resting_equations("follow", solution.scene)
+        problem = Equilibria(solution.scene, equations, (name,), solution.state, solution.shifts, solution.speeds)
+        tangent = np.zeros(len(problem.point))
+        if isinstance(first, Bifurcation) and leaves:
+            tangent[: problem.size] = sign * first.vectors[vector].real
+    elif isinstance(first, Bifurcation) and leaves:
+        factor = 2 if first.kind is BifurcationKind.PERIOD_DOUBLING else 1
+        problem, point = Cycles.leaving(solution, name, sign * first.vectors[vector].real, factor)
+        tangent = point.tangent
+    else:
+        problem = Cycles.of(solution, name)
+        tangent = np.zeros(len(problem.point))
+    problem.set_ranges(np.array([size]))
+    if leaves:
+        return problem, Point(problem.point, tangent / float(np.linalg.norm(problem.weights * tangent)), 0)
+    tangent[-1] = sign / problem.weights[-1]
+    found = correct(problem, problem.point, tangent)
+    if found is None:
+        raise ArithmeticError(f"follow: found no solution at {problem.names[-1]} = {problem.point[-1]:g} near `first`")
+    z, tangent = problem.accept(found.z, found.tangent)
+    return problem, Point(z, tangent, 0, problem.critical(z))
 
 
 def _check_name(scene: Scene, name: str) -> None:
@@ -221,66 +263,75 @@ def _bounds(
     return (min(begin, *ends), max(begin, *ends)), requested
 
 
-def _leaves(first: object) -> bool:
-    """Return whether a branch begins at a bifurcation, where it goes to both sides."""
-    return isinstance(first, Bifurcation) and first.kind in (BifurcationKind.BRANCH_POINT, BifurcationKind.FOLD)
-
-
-def _start(problem: Equilibria, first: Bifurcation | None, sign: float, vector: int) -> Point:
-    """Return the first point of a branch with its tangent; without critical values where it leaves a bifurcation."""
-    if first is not None and _leaves(first):
-        if not 0 <= vector < len(first.vectors):
-            raise ValueError(f"vector: found {vector}; expected a number below {len(first.vectors)}")
-        tangent = np.zeros(len(problem.point))
-        tangent[: problem.size] = sign * first.vectors[vector].real
-        return Point(problem.point, tangent / float(np.linalg.norm(problem.weights * tangent)), 0)
-    along = np.zeros(len(problem.point))
-    along[-1] = sign / problem.weights[-1]
-    point = correct(problem, problem.point, along)
-    if point is None:
-        raise ArithmeticError(f"follow: found no solution at {problem.names[-1]} = {problem.point[-1]:g} near `first`")
-    z, tangent = problem.accept(point.z, point.tangent)
-    return Point(z, tangent, 0, problem.critical(z))
-
-
-def _trace(
-    problem: Equilibria, start: Point, limits: Limits
-) -> tuple[list[tuple[Point, Equilibrium]], list[Bifurcation], str]:
+def _trace(problem: Equilibria | Cycles, start: Point, limits: Limits) -> Part:
     """Walk along a branch; return its points with their solutions, the bifurcations and how it ends."""
-    steps = walk(problem, start, limits, bifurcations)
-    points = [(start, problem.solution(start))]
+    corners = None
+    events = cycle_bifurcations if isinstance(problem, Cycles) else bifurcations
+    if isinstance(problem, Cycles) and problem.flow.equations.sticks and problem.flow.equations.n == 1:
+        corners = Corners(problem)
+    steps = walk(problem, start, limits, corners or events)
+    points: list[tuple[Point, Equilibrium | PeriodicOrbit]] = [(start, problem.solution(start))]
     found: list[Bifurcation] = []
     while True:
         try:
             each = next(steps)
-        except StopIteration as end:
-            return points, found, end.value
+        except StopIteration as ended:
+            end = str(ended.value)
+            corner = corners.at_end([point for point, _ in points]) if corners and end.startswith("lost") else None
+            if corner is not None:
+                found.append(_corner(problem, corner))
+                end = f"grazing at {problem.names[-1]} = {corner.point.value:.8g}"
+            return points, found, end
         if isinstance(each, Point):
             points.append((each, problem.solution(each)))
+        elif isinstance(each, Corner):
+            found.append(_corner(problem, each))
         elif isinstance(each, Located):
             found.append(_bifurcation(problem, each))
+            if found[-1].kind in BORN and each.kind is BifurcationKind.BRANCH_POINT:
+                # The branch is born there; beyond it are the same cycles, shifted in time.
+                return points, found, f"{found[-1].kind} at {problem.names[-1]} = {each.point.value:.8g}"
 
 
-def _bifurcation(problem: Equilibria, located: Located) -> Bifurcation:
-    """Compute what belongs to a located bifurcation of equilibria."""
+def _corner(problem: Equilibria | Cycles, corner: Corner) -> Bifurcation:
+    """Return what belongs to a change of phases."""
+    solution = problem.solution(corner.point)
+    return Bifurcation(
+        corner.point.value, corner.kind, corner.residual, solution, problem.names[-1], corner.point.length
+    )
+
+
+def _bifurcation(problem: Equilibria | Cycles, located: Located) -> Bifurcation:
+    """Compute what belongs to a located bifurcation."""
     point, critical = located.point, located.point.critical
     if critical is None:
         raise RuntimeError("a bifurcation without critical values")
     value, block = located.critical, int(critical.blocks[located.index])
     solution, count = problem.solution(point), located.multiplicity
     coefficient = math.nan
-    if located.kind is BifurcationKind.HOPF:
+    if isinstance(problem, Cycles):
+        value = complex(value.real, abs(value.imag))
+        basis = problem.vectors(point.z, value if value.imag else complex(round(value.real)), count, block)
+        alike = count == 1 or value.imag or solution.scene.equations.sticks
+        vectors = basis.T if alike else directions(problem.scene, solution.state, basis.real)
+        mode = "" if block < 0 or problem.transversal is None else problem.transversal.text(block)
+    elif located.kind is BifurcationKind.HOPF:
         value = complex(value.real, abs(value.imag))
         vectors = directions(problem.scene, solution.state, problem.vectors(point.z, value, count))
         # Real and imaginary part of the eigenvector are orthogonal at this phase.
         vectors = vectors * np.exp(-0.5j * np.angle((vectors**2).sum(axis=1)))[:, None]
+        mode = problem.blocks.text(block) if problem.blocks is not None and block >= 0 else ""
         if count == 1:
             coefficient = first_lyapunov_coefficient(problem, point.z, vectors[0], value.imag)
     else:
         vectors = directions(problem.scene, solution.state, problem.vectors(point.z, 0.0, count))
+        mode = problem.blocks.text(block) if problem.blocks is not None and block >= 0 else ""
+    kind = located.kind
+    if isinstance(problem, Cycles) and kind is BifurcationKind.BRANCH_POINT:
+        kind = problem.birth(point.z) or kind
     return Bifurcation(
         point.value,
-        located.kind,
+        kind,
         abs(critical.growth[located.index]) / critical.scale,
         solution,
         problem.names[-1],
@@ -288,12 +339,12 @@ def _bifurcation(problem: Equilibria, located: Located) -> Bifurcation:
         value,
         count,
         vectors.astype(complex),
-        problem.blocks.text(block) if problem.blocks is not None and block >= 0 else "",
+        mode,
         coefficient,
     )
 
 
-def _joined(name: str, parts: list[tuple[list[tuple[Point, Equilibrium]], list[Bifurcation], str]]) -> Branch:
+def _joined(name: str, parts: list[Part]) -> Branch:
     """Return the branch of the parts that were followed in each direction from its first solution."""
     points, found, ends = parts[-1]
     both: tuple[str, ...] = (ends,)
@@ -325,30 +376,17 @@ def _joined(name: str, parts: list[tuple[list[tuple[Point, Equilibrium]], list[B
     )
 
 
-def _along_orbits(
-    first: PeriodicOrbit, name: str, to: float | None, values: Sequence[float] | np.ndarray | None
-) -> Branch:
-    """Follow a periodic orbit of one oscillator along monotonic values of a parameter."""
-    if first.free:
+def checked_values(scene: Scene, name: str, values: Sequence[float] | np.ndarray) -> list[float]:
+    """Check the values (k,) of a parameter: finite, and rising or falling all the way; return them as floats."""
+    if name not in scene.parameters:
+        raise ValueError(f"unknown parameter {name!r}; known: {', '.join(scene.parameters)}")
+    expect_free("branch", [name], NAMES)
+    if not np.iterable(values) or not all(isinstance(value, Real) and math.isfinite(value) for value in values):
+        raise ValueError(f"values: found {short_repr(values)}; expected finite numbers for {name}")
+    checked = [float(value) for value in values]
+    steps = np.diff(checked)
+    if not checked or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         raise ValueError(
-            "first: found the limit cycle of an oscillator without a drive; expected an orbit of a driven one; "
-            "periodic_orbit finds cycles value by value"
+            f"values: found {short_repr(checked)}; expected at least one number, rising or falling all the way"
         )
-    if values is None:
-        if to is None:
-            raise ValueError(f"follow: found no end for {name}; expected to= or values=")
-        values = np.linspace(first.scene.parameters[name], to, 33)
-    checked = checked_values(first.scene, name, values)
-    branch = traced(first.scene, name, checked, first, abs(checked[-1] - checked[0]))
-    warn_of_lost("follow", [branch])
-    return branch
-
-
-def warn_of_lost(function: str, branches: Sequence[Branch]) -> None:
-    """Warn the caller of a function in one line if branches are lost."""
-    lost = [value for branch in branches for value in branch.lost]
-    if lost:
-        warn(
-            f"{function}: found no orbit and no bifurcation beyond {branches[0].name} = {digits_of(lost)}; expected the "
-            "branch to go on, or to end at a bifurcation; try a shorter range there, or periodic_orbit beyond"
-        )
+    return checked

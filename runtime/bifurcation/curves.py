@@ -53,6 +53,8 @@ NOISE = 1e-13
 class EigenvectorCurve:
     """What curves of folds and of Hopf points share: the equilibrium, and derivatives along a vector."""
 
+    kinked = False
+
     kind_of_points: BifurcationKind
 
     def __init__(self, base: Equilibria, vector: np.ndarray, frequency: float = 0.0) -> None:

@@ -22,6 +22,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.polynomial import chebyshev
 from scipy.optimize import brentq
 
 from .arclength import Point, correct
@@ -35,8 +37,11 @@ TOUCHING = 1e-5
 """Largest growth of the value that touches zero at a turn, relative to the largest value (a choice): it grows as the
 square of the distance, which is located to half of the digits."""
 
-BESIDE = 1e-3
+BESIDE = 0.03
 """Distance from a turn, relative to the step, at which the value that passes or touches zero is compared (a choice)."""
+
+NODES = 9
+"""Solutions of a step from which its turning point at a branch point is computed (a choice)."""
 
 REAL = 1e-7
 """A value whose imaginary part is smaller, relative to the largest value, is real: the square root of rounding."""
@@ -95,6 +100,24 @@ class Step:
         """Return the distance at which the growth of a critical value passes zero."""
         return self.zero(lambda point: float(_critical(point).growth[index]))
 
+    def turning_point(self, distance: float) -> Point:
+        """Return the solution at which the parameter turns near a distance, at a branch point.
+
+        Newton's method has few digits there.  The solution follows from a polynomial through NODES regular ones.
+        """
+        nodes = -np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
+        solutions = np.array([self.at(float(0.5 * self.length * (1.0 + x))).z for x in nodes])
+        coefficients = np.linalg.solve(chebyshev.chebvander(nodes, NODES - 1), solutions)
+        roots = chebyshev.chebroots(chebyshev.chebder(coefficients[:, -1]))
+        real = roots[np.abs(roots.imag) < TOUCHING].real
+        guess = 2.0 * distance / self.length - 1.0
+        x = float(real[np.abs(real - guess).argmin()]) if len(real) else guess
+        z = np.asarray(chebyshev.chebval(x, coefficients))
+        point = self.at(distance)
+        return replace(
+            point, z=z, critical=self.problem.critical(z), length=self.before.length + 0.5 * self.length * (1.0 + x)
+        )
+
 
 def bifurcations(problem: Problem, before: Point, after: Point, length: float) -> list[tuple[float, object]] | None:
     """Return the bifurcations on a step with their distances from its beginning; None if the step is too long."""
@@ -118,7 +141,8 @@ def bifurcations(problem: Problem, before: Point, after: Point, length: float) -
             # Of few eigenvalues of a large network one may pass although the number of growing ones stays the same.
             sides = [_nearest(step.at(min(max(turn + d * length, 0.0), length))) for d in (-BESIDE, BESIDE)]
             kind = problem.kind(complex(critical.values[touching].real), sides[0] * sides[1] < 0.0)
-            located.append((turn, Located(kind, step.at(turn), touching)))
+            fold = kind is BifurcationKind.FOLD
+            located.append((turn, Located(kind, step.at(turn) if fold else step.turning_point(turn), touching)))
     return [*_together(located, length)]
 
 
@@ -135,7 +159,9 @@ def _passing(step: Step, indices: range, turn: float | None) -> Iterator[tuple[f
         distance = step.zero_of_growth(index)
         critical = _critical(step.at(distance))
         paired = abs(critical.values[index].imag) > REAL * critical.scale
-        turned = not paired and turn is not None and abs(distance - turn) < 100.0 * TOGETHER * step.length
+        turned = False
+        if turn is not None and not paired:  # the value that passes is neutral at the turn
+            turned = abs(float(_critical(step.at(turn)).growth[index])) <= TOUCHING * critical.scale
         if turned and turn is not None:
             distance = turn  # a fold is located better by the turn: the value is a square root of the parameter
         value = complex(critical.values[index])

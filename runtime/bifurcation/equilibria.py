@@ -52,6 +52,7 @@ class Equilibria:
         speeds: np.ndarray,
     ) -> None:
         self.scene, self.names, self.shifts = scene, names, shifts
+        self.kinked = False
         self.size = len(state)
         self.values: Mapping[str, float] = dict(scene.parameters)
         self.network = Linearised.of(equations, self.values)

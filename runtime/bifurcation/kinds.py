@@ -12,6 +12,6 @@ class BifurcationKind(StrEnum):
     BRANCH_POINT = "branch point"  # at 0 or 1; transcritical or pitchfork
     HOPF = "Hopf"  # a complex pair of eigenvalues of an equilibrium
     PERIOD_DOUBLING = "period doubling"  # at -1
-    NEIMARK_SACKER = "Neimark-Sacker"  # a complex pair of multipliers
+    TORUS = "torus"  # a complex pair of multipliers; also called Neimark-Sacker
     GRAZING = "grazing"  # a phase of stick or slip begins in the middle of another one
     STICK_LOSS = "stick loss"  # a body that landed in stick turns at once

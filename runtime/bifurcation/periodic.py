@@ -1,226 +1,98 @@
-"""Find periodic orbits by Newton's method.
+"""Find a periodic orbit of a network as it moves, or near a start.
 
-A drive of period T makes the stroboscopic map P: x(0) -> x(kT) over k of its periods.  An orbit of k periods is a fixed
-point, found by x <- x + (I - M)^-1 (P(x) - x).  The derivative M of P is the monodromy matrix: the propagator of a
-deviation along the orbit (`synchain.runtime.stability.orbits`), through stick and slip if friction is set-valued, so
-that the method converges quadratically for both forms of the law.  The eigenvalues of M are the Floquet multipliers.
+1. Nodes that start alike and stay alike by symmetry are one node of the quotient network, on which the orbit is found.
+2. With a drive, Newton's method starts from the state after the transient.
+3. Without a drive, the motion is followed through the transient to its first return near a state; Newton's method solves
+   for state and period together (`Cycles`).  A motion that was followed must be attracted by its cycle, while a start with
+   a period leads to unstable cycles as well.
+4. How the nodes move is read off the motion (`pattern_of`).
 
-The cycle of an undriven oscillator is followed to its attractor first; `synchain.runtime.stability.limit_cycle` then
-solves for a state and the period together.
-
-Sources: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapter 7;
-for orbits with stick, Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems
-(Springer, 2004), chapters 7-8.
+Sources: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapter 7; for orbits with stick,
+Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer, 2004), chapters 7-8.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
+from itertools import islice
 from numbers import Integral, Real
 
 import numpy as np
-import xarray as xr
 from scipy.optimize import brentq
 
-from synchain.models.dynamics.angles import periods_of_kinds
-from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.reduction import without_drive
-from synchain.models.inputs.checks import short_repr
-from synchain.models.inputs.keywords import warn
+from synchain.models.dynamics.reduction import NoQuotient, quotient
+from synchain.models.dynamics.synchrony import NoSynchrony
+from synchain.models.inputs.checks import check_number, is_row, short_repr
 from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.run_keywords import Given
-from ..results.labelled import Labelled, dataset, scene_text
-from ..stability.attractor import RETURN, cycle_propagators
-from ..stability.exponents import coupled_cell
-from ..stability.limit_cycle import limit_cycle
-from ..stability.motion import Turns, rests
-from ..stability.orbits import OrbitProblem, unit_of_time, within
-from .phases import Phases, phases_of
-
-TOLERANCE = 1e-12
-"""Relative tolerance of the integration: five digits below SAME (a choice)."""
+from ..stability.limit_cycle import APART, NEAR, RETURNS, returns
+from ..stability.motion import rests, turns_of
+from ..sweeps.continued_start import StartValue, started
+from .arclength import Point
+from .cycles import Cycles, quotient_of
+from .flow import TOLERANCE, Flow, flow_of
+from .pattern import pattern_of
+from .periodic_result import PeriodicOrbit, closed
+from .transversal import expansion
 
 NEWTON = {
     "rtol": f"orbits are integrated with rtol = {TOLERANCE:g}, on which the comparison of orbits rests",
     "workers": "each step of Newton's method needs the one before",
     "executor": "each step of Newton's method needs the one before",
+    **{name: "a few steps of Newton's method are soon done" for name in ("show_progress", "progress")},
 }
 """Keywords that functions of periodic orbits refuse, with the reason."""
 
-SAME = 1e-7
-"""Largest distance of two orbits that count as one, relative to the extent of each component (a choice)."""
-
 CLOSED = 1e-9
-"""Largest distance of the state of an orbit from its image, relative to the extent of each component (a choice)."""
+"""Largest distance of the state of an orbit from its image, relative to the extent of each state (a choice)."""
 
-ROUNDING = 10.0 * TOLERANCE
-"""Largest error of the integration, relative to a state (a choice); a smaller sliding speed, relative to its extent, is
-an
-error too."""
-
-TRAVELLED = 1e-3
-"""The extent of an orbit is at least this part of the distance that Newton's method went from its start (a choice)."""
-
-ASTRAY = 1e6
-"""Newton's method ends if it goes farther than this many extents of the motion from its start (a choice)."""
-
-MOST_STEPS = 30
-"""Most steps of Newton's method: it doubles the digits in a step near an orbit (a choice)."""
+REST = 1e-9
+"""A motion rests if its rates are below their change over this part of its extent (a choice)."""
 
 LONGEST = 10_000
 """Most drive periods of an orbit; unstable ones far shorter already lose all their digits."""
 
+TOGETHER = 100
+"""Periods of a transient in one call; Ctrl-C acts between calls."""
 
-@dataclass(frozen=True, slots=True, repr=False)
-class PeriodicOrbit(Labelled):
-    """A motion that repeats itself: after some periods of the drive, or after the period of an undriven oscillator.
-
-    Parameters
-    ----------
-    scene : Scene
-        Oscillator with its parameters.
-    periods : int
-        Number of drive periods; 1 without a drive.
-    state : ndarray, shape (components,)
-        State at the beginning of a period of the drive, or anywhere on the orbit of an undriven oscillator.
-    multipliers : ndarray, shape (components,)
-        Floquet multipliers of the oscillator alone, the largest first; without a drive one of them is 1, that of a
-        shift along the orbit.
-    residual : float
-        Largest distance of the state from its image.
-    steps : int
-        Steps of Newton's method.
-    free : float
-        The time after which the motion of an undriven oscillator repeats itself; 0 with a drive.
-    extent : ndarray, shape (components,)
-        Extent of each component, the unit of distances between states. For a component at rest, the unit follows from
-        the distance that Newton's method went from its start.
-
-    See Also
-    --------
-    synchain.periodic_orbit
-    """
-
-    scene: Scene = field(repr=False)
-    periods: int
-    state: np.ndarray
-    multipliers: np.ndarray
-    residual: float
-    steps: int
-    free: float = 0.0
-    extent: np.ndarray = field(default_factory=lambda: np.ones(1), repr=False)
-
-    @property
-    def period(self) -> float:
-        """The time after which the motion repeats itself, in units of non-dimensional time."""
-        return self.free or self.periods * unit_of_time(self.scene)
-
-    @property
-    def components(self) -> tuple[str, ...]:
-        """Names of the components of `state`."""
-        return tuple(name for name in self.scene.components if name not in self.scene.equations.modes)
-
-    @property
-    def data(self) -> xr.Dataset:
-        """State and Floquet multipliers."""
-        return dataset(
-            {
-                "state": (("component",), self.state, "state at the beginning of a period"),
-                "multipliers": (("number",), self.multipliers, "Floquet multipliers, the largest first"),
-            },
-            {"component": list(self.components), "number": np.arange(1, len(self.multipliers) + 1)},
-            self.scene,
-        )
-
-    @property
-    def summary(self) -> tuple[tuple[str, str], ...]:
-        """Periods, state, multipliers and residual."""
-        state = ", ".join(f"{name} = {x:.10g}" for name, x in zip(self.components, self.state, strict=True))
-        sizes = ", ".join(f"{value:.6g}" for value in self.multipliers)
-        return (
-            ("scene", scene_text(self.scene)),
-            ("orbit", "of one oscillator, alone or in step with the others"),
-            ("period", f"{self.period:.12g} units of time") if self.free else ("drive periods", str(self.periods)),
-            ("state", state),
-            ("multipliers", f"{sizes}: {'stable' if self.stable else 'unstable'} for one oscillator"),
-            ("residual", f"{self.residual:.1e} after {self.steps} steps"),
-        )
-
-    @property
-    def stable(self) -> bool:
-        """True if all multipliers, except the multiplier 1 of a shift along the orbit, lie inside the unit circle."""
-        shift = [int(np.abs(self.multipliers - 1.0).argmin())] if self.free else []
-        return bool(np.all(np.abs(np.delete(self.multipliers, shift)) < 1.0))
-
-    @property
-    def phases(self) -> Phases | None:
-        """Phases of stick and slip of one cycle; None without set-valued friction."""
-        return phases_of(self.scene, self.state, self.periods)
-
-    @property
-    def points(self) -> np.ndarray:
-        """The states (periods, components) at the beginning of each period of the drive."""
-        points = [self.state]
-        for _ in range(self.periods - 1):
-            points.append(_strobe(self.scene, points[-1], 1, 0.0, extent=self.extent)[0][: len(self.state)])
-        return np.array(points)
-
-    @property
-    def least(self) -> int:
-        """Least number of drive periods after which the motion repeats itself, to within SAME."""
-        if self.periods == 1:
-            return 1
-        points = self.points
-        divisors = (k for k in range(1, self.periods) if self.periods % k == 0)
-        return next((k for k in divisors if self.meets(points[k])), self.periods)
-
-    def meets(self, state: np.ndarray) -> bool:
-        """Return whether a state is one of the orbit's `points`, to within SAME and whole turns of angles."""
-        gap = state - self.state
-        return closed(gap - whole_turns(self.scene, gap), SAME * self.extent, self.state)
-
-    def transversal_multipliers(self, alpha: float) -> np.ndarray:
-        """Compute the multipliers of a transversal mode along the orbit.
-
-        Parameters
-        ----------
-        alpha : float
-            Strength of the mode.
-
-        Returns
-        -------
-        ndarray, shape (components,)
-            The largest first.
-        """
-        return _multipliers(_strobe(self.scene, self.state, self.periods, alpha, self.free, self.extent)[1])
+LOOKS, FEWER_LOOKS, MANY = 256, 64, 64
+"""States in a period from which the pattern of the nodes is read; fewer for MANY nodes (choices)."""
 
 
 def periodic_orbit(
     scene: Scene,
     periods: int = 1,
-    start: Sequence[float] | np.ndarray | None = None,
+    start: StartValue | None = None,
     *,
+    period: float | None = None,
+    clusters: Sequence[int] | None = None,
     parameters: Mapping[str, float] | None = None,
     **more: float,
 ) -> PeriodicOrbit:
-    """Find a periodic orbit of one oscillator of a scene, which is also the synchronous orbit of a network.
+    """Find a periodic orbit of a network as it moves, and its stability.
 
-    `PeriodicOrbit.transversal_multipliers` decides whether a network stays synchronous.  The scene provides the model,
-    parameters, initial state, transient with its unit, integrator and max_steps.  The tolerance is 1e-12, nothing is
-    recorded, and axes, draws and `stop` are refused.
+    Nodes that are alike and start alike move alike: the orbit is found on the quotient network, and the multipliers of
+    the differences between the nodes are computed along it, mode by mode of the graph.  `print(orbit)` tells how the nodes
+    move, and the stability along this motion and across it.  ``periodic_orbit(scene.lone)`` is the orbit of one node.
 
     Parameters
     ----------
     scene : Scene
-        Source of the oscillator.
+        The network, with parameters, initial state, transient, integrator and max_steps.  The tolerance is 1e-12,
+        nothing is recorded, and axes, draws and `stop` are refused.
     periods : int
         Number of drive periods after which the orbit repeats itself; 1 without a drive.
-    start : array_like, shape (components,), optional
-        Start of Newton's method; by default the scene's initial state after its transient.  For an undriven oscillator,
-        the motion from the start must reach the orbit, which must attract; the transient counts mean return times.
+    start : Result, DataArray, mapping, or sequence of numbers, optional
+        Where Newton's method starts: as for `run`, or the states of one node for all of them.  By default the scene's
+        initial state after its transient.  Without a drive and without `period`, the motion from the start must reach
+        the orbit, which must attract; the transient counts mean return times.
+    period : float, optional
+        The period near which an undriven orbit is looked for from `start`: Newton's method alone, for unstable orbits too.
+    clusters : sequence of int, optional
+        The cluster of each node, such as ``[0, 1, 1, 0]``; by default the nodes with one start that symmetry keeps alike.
     parameters : mapping of str to float, optional
         Parameters of the scene to set, for names that are keywords already.
     **more : float
@@ -230,17 +102,12 @@ def periodic_orbit(
     -------
     PeriodicOrbit
 
-    Warns
-    -----
-    RuntimeWarning
-        If the nodes of a network were given different initial states, which one oscillator does not have.
-
     Raises
     ------
     ValueError
-        If `periods` is out of range, a parameter is unknown, or `start` is no state.
+        If `periods` is out of range, a parameter is unknown, `start` is no state, or `clusters` is not balanced.
     ArithmeticError
-        If Newton's method does not converge.
+        If Newton's method does not converge, or the motion does not return.
 
     See Also
     --------
@@ -256,130 +123,57 @@ def periodic_orbit(
     >>> orbit = periodic_orbit(Scene("van_der_pol"))
     >>> round(orbit.period, 6), orbit.stable
     (6.663287, True)
+
+    Two of them that push each other apart:
+
+    >>> from synchain import Field, Rates
+    >>> from synchain.graphs import chain
+    >>> node = Field({"x": "v", "v": "(1 - x**2)*v - x"})
+    >>> pair = Scene(node, Rates({"v": "-k*W*(v_j - v_i)"}, {"k": 0.3}), chain(2), initial={"x": 2, "v": 0})
+    >>> print(periodic_orbit(pair).verdict)
+    synchronous; along itself stable; across it unstable in 1 of 1 modes, largest 5.92024
     """
-    if start is None:
-        _warn_of_different_starts(scene)
-    few = {name: "a few steps of Newton's method are soon done" for name in ("show_progress", "progress")}
-    scene = coupled_cell(Given(periodic_orbit, parameters, more, {**NEWTON, **few}), scene, TOLERANCE)
+    scene = Given(periodic_orbit, parameters, more, NEWTON).scene(check_scene(scene))
     check_periods(periods)
-    if not without_drive(scene.equations, scene.parameters).forced:
-        return _limit_cycle(scene, periods, start)
     if start is not None:
-        return _newton(scene, int(periods), _state(scene, start))
-    # Newton's method starts from the state after the transient, in units of the drive's period.
-    first = _initial(scene)[None]
-    problem = OrbitProblem.of_modes(scene, np.zeros(1), first, 1)
-    units = scene.transient if scene.time_unit == "period" else math.ceil(scene.transient / problem.unit)
-    _, (settled,) = problem.settled(problem.with_slip_states(first), units)
-    return _newton(scene, int(periods), np.asarray(settled[: problem.components]))
-
-
-def _newton(scene: Scene, periods: int, start: np.ndarray) -> PeriodicOrbit:
-    """Find the orbit of a driven oscillator near a start (components,)."""
-    extent = _extent(scene, start, periods)
-    best, steps, nearest, state = np.inf, 0, start, start
-    while steps < MOST_STEPS:
-        image, matrix = _strobe(scene, state, periods, 0.0, extent=extent)
-        gap = image[: len(state)] - state
-        # A state that slips at a rounding error, and whose image sticks: take the velocity of the ground.
-        if _nearly_sticks(image, gap, extent):
-            state = image[: len(state)] - np.array([gap[0], 0.0])
-            continue
-        # Stop where the gap no longer falls: it has come down to the errors of the integration, or diverges.
-        residual = relative(gap, extent)
-        if not residual < best:
-            break
-        best, nearest, monodromy, left = residual, state, matrix, gap
-        if residual == 0.0:
-            break
-        if _sticks_throughout(image, matrix):
-            # The ground carries the body along, so that I - M is singular: follow the motion until the body slips.
-            best, state = np.inf, image[: len(state)]
-        else:
-            try:
-                state = state + np.asarray(np.linalg.solve(np.eye(len(gap)) - matrix, gap))
-            except np.linalg.LinAlgError:
-                raise ArithmeticError(
-                    "Newton's method: a multiplier is 1 to rounding, so the orbit is not isolated"
-                ) from None
-        steps += 1
-        if not relative(state - start, extent) < ASTRAY:
-            break
-    # Accept by the extent of the orbit itself; a component at rest is measured by the way from the start.
-    extent = np.maximum(_extent(scene, nearest, periods, extent), TRAVELLED * np.abs(nearest - start))
-    size = float(np.abs(left).max())
-    if not closed(left, CLOSED * extent, nearest):
-        raise ArithmeticError(
-            f"no orbit of {periods} drive period{'s' * (periods > 1)} near the start: the best residual was {size:.1e}"
-        )
-    return PeriodicOrbit(scene, periods, nearest, _multipliers(monodromy), size, steps, extent=extent)
-
-
-def relative(distance: np.ndarray, extent: np.ndarray) -> float:
-    """Return the largest component of a distance, in units of the extent; a component without extent is not scaled."""
-    return float(np.abs(distance / np.where(extent > 0.0, extent, 1.0)).max())
-
-
-def closed(gap: np.ndarray, allowed: np.ndarray, state: np.ndarray) -> bool:
-    """Return whether every component of a gap at a state is as small as allowed, but for errors of the integration."""
-    return bool(np.all(np.abs(gap) <= allowed + ROUNDING * np.abs(state)))
-
-
-def whole_turns(scene: Scene, differences: np.ndarray) -> np.ndarray:
-    """Return the whole turns in differences (..., components) of the states of one oscillator.
-
-    0 where it has no angle.
-    """
-    # Links do not move an orbit of one oscillator, so its equations alone decide which components are angles.
-    (periods,) = periods_of_kinds(Equations.of_equal_nodes(scene.equations.node, None, 1))
-    turns = np.zeros_like(differences)
-    for component, period in enumerate(periods[: differences.shape[-1]]):
+        scene = _started(scene, start)
+    classes = _clusters(scene, clusters)
+    equations = quotient_of(scene, classes, ())
+    state = _quotient_state(scene, classes, equations.n)
+    flow = flow_of(scene, equations, (), state)
+    if equations.forced:
         if period is not None:
-            turns[..., component] = period * np.round(differences[..., component] / period)
-    return turns
-
-
-def _extent(scene: Scene, state: np.ndarray, periods: int, scales: np.ndarray | None = None) -> np.ndarray:
-    """Measure how far each component (components,) moves within some drive periods; `scales` set the tolerances."""
-    problem, first = _problem(scene, state, 0.0, scene.period, scales)
-    return np.asarray(np.ptp([first, *within(problem, first[None], periods)], axis=0)[: len(state)])
-
-
-def _limit_cycle(scene: Scene, periods: int, start: Sequence[float] | np.ndarray | None) -> PeriodicOrbit:
-    """Find the cycle that attracts an undriven oscillator from its start."""
-    if periods != 1:
-        raise ValueError(f"periods = {periods}; expected 1 for an oscillator without a drive, whose period is found")
-    if scene.equations.sticks:
-        raise ValueError(
-            "periodic orbits: found set-valued friction without a drive; expected a drive, or a smoothed law"
-        )
-    # Follow the motion through the transient; it must not come to rest.
-    first = (_initial(scene) if start is None else _state(scene, start))[None]
-    problem = OrbitProblem.of_modes(scene, np.zeros(1), first, 1)
-    problem, (settled,) = problem.settled(problem.with_slip_states(first), scene.transient)
-    if rests(problem.rates, settled, RETURN, problem.extent):
-        at = ", ".join(f"{name} = {x:.6g}" for name, x in zip(scene.components, settled, strict=False))
-        raise ArithmeticError(f"no cycle: the motion comes to rest at {at}; `equilibrium` finds such states")
-    # Newton's method for state and period, then the multipliers along the cycle.
-    cycle = limit_cycle(problem, settled, RETURN)
-    if cycle is None:
-        raise ArithmeticError(
-            f"no attracting cycle near the motion after {scene.transient:g} mean return times; start elsewhere, or settle longer"
-        )
-    state, extent = cycle.state, problem.extent
-    image, matrix = _strobe(scene, state, 1, 0.0, cycle.period, extent)
-    residual = float(np.abs(image - state).max())
-    return PeriodicOrbit(scene, 1, state, _multipliers(matrix), residual, cycle.steps, cycle.period, extent)
-
-
-def _nearly_sticks(image: np.ndarray, gap: np.ndarray, extent: np.ndarray) -> bool:
-    """Return whether a state slips at a speed of rounding errors and its image sticks."""
-    return len(image) > len(gap) and image[-1] == 0.0 and 0.0 < abs(gap[1]) < ROUNDING * extent[1]
-
-
-def _sticks_throughout(image: np.ndarray, matrix: np.ndarray) -> bool:
-    """Return whether a body sticks in all periods: the map only shifts the position, so that M = diag(1, 0)."""
-    return len(image) > len(matrix) and image[-1] == 0.0 and np.array_equal(matrix, np.diag([1.0, 0.0]))
+            raise ValueError(
+                f"period = {short_repr(period)}; expected none beside a drive; give `periods`, whole ones of it"
+            )
+        if not scene.period:
+            raise ValueError(
+                f"periodic_orbit: the oscillator {scene.oscillator.name!r} {scene.drive.problem}; expected a drive with a period"
+            )
+        if start is None:
+            state = _settled(flow, scene, state)
+        problem = Cycles.near(scene, (), classes, state[None], periods * scene.period, int(periods))
+        z, gap, steps = problem.solved()
+        if not _accepted(problem, z):
+            raise ArithmeticError(
+                f"no orbit of {periods} drive period{'s' * (periods > 1)} near the start: the best residual was {gap:.1e}"
+            )
+    else:
+        if periods != 1:
+            raise ValueError(
+                f"periods = {periods}; expected 1 for an oscillator without a drive, whose period is found"
+            )
+        if period is not None:
+            length = check_number("period", period, 0.0)
+            problem = Cycles.near(scene, (), classes, state[None], length, 0)
+            z, gap, steps = problem.solved()
+            if not _accepted(problem, z):
+                raise ArithmeticError(
+                    f"no orbit near the start with a period near {length:.6g}: the best residual was {gap:.1e}"
+                )
+        else:
+            problem, z, steps = _cycle(scene, classes, flow, state)
+    return _described(problem, problem.solution(Point(z, z, steps)), z)
 
 
 def check_periods(periods: object) -> None:
@@ -388,67 +182,149 @@ def check_periods(periods: object) -> None:
         raise ValueError(f"periods = {short_repr(periods)}; expected a whole number, at least 1, at most {LONGEST}")
 
 
-def orbit_through(scene: Scene, periods: int, state: np.ndarray, parameters: Mapping[str, float]) -> PeriodicOrbit:
-    """Return the orbit through a state that returns to itself, without a search. Shapes: state (components,)."""
-    scene = _driven(Given(orbit_through, parameters), scene)
-    extent = _extent(scene, state, periods)
-    image, matrix = _strobe(scene, state, periods, 0.0, extent=extent)
-    residual = float(np.abs(image[: len(state)] - state).max())
-    return PeriodicOrbit(scene, periods, state, _multipliers(matrix), residual, 0, extent=extent)
-
-
-def strobe(
-    scene: Scene,
-    state: np.ndarray,
-    periods: int,
-    parameters: Mapping[str, float] | None = None,
-    extent: np.ndarray | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Evaluate the stroboscopic map and its derivative.
-
-    Shapes: state (components,), extent (components,); returns image (components,), matrix (components, components).
-    """
-    image, matrix = _strobe(_driven(Given(strobe, parameters), scene), state, periods, 0.0, extent=extent)
-    return image[: len(state)], matrix
-
-
-def _driven(keywords: Given, scene: Scene) -> Scene:
-    """Return the scene with its parameters and the tolerance of orbits; ValueError if it has no drive."""
-    scene = keywords.scene(scene, rtol=TOLERANCE)
-    unit_of_time(scene)
-    if not scene.period:
-        raise ValueError(
-            "periodic orbits are looked for on the stroboscopic map of a drive; found an oscillator without one"
-        )
-    return coupled_cell(Given(keywords.function), scene, TOLERANCE)
-
-
-def _warn_of_different_starts(scene: Scene) -> None:
-    """Warn if the nodes of a network were given different initial states."""
-    initial = check_scene(scene).given["initial"] or {}
-    different = next((name for name in initial if name in scene.initial and len({*scene.initial[name]}) > 1), None)
-    if different is not None:
-        warn(
-            f"periodic_orbit: found different initial {different} of {scene.n} nodes; expected equal ones, as the orbit is that "
-            "of one oscillator; the start of the first is taken; run the scene to see how the network moves"
-        )
-
-
-def _initial(scene: Scene) -> np.ndarray:
-    """Return the initial state of the first oscillator, with its slip state if it has one."""
-    return np.array([values[0] for values in scene.initial.values()], dtype=float)
-
-
-def _state(scene: Scene, start: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Check a start and return it as the state (components,) of one oscillator, without a slip state."""
+def _started(scene: Scene, start: StartValue) -> Scene:
+    """Return the scene with another start; numbers for one node are those of all nodes."""
     names = tuple(name for name in scene.components if name not in scene.equations.modes)
+    if isinstance(start, list | tuple | np.ndarray) and is_row(start):
+        try:
+            numbers = np.array(start, dtype=float).ravel()
+        except (TypeError, ValueError):
+            numbers = np.full(1, np.nan)
+        if len(numbers) == len(scene.components) and scene.n > 0 and len(names) < len(scene.components):
+            numbers = numbers[: len(names)]  # the slip state follows from the velocity
+        if len(numbers) not in (len(names), len(names) * scene.n) or not np.isfinite(numbers).all():
+            raise ValueError(f"start: found {short_repr(start)}; expected a number for each of {', '.join(names)}")
+        if not scene.equations.mixed:
+            table = np.broadcast_to(numbers.reshape(len(names), -1), (len(names), scene.n))
+            return scene.replace(initial=dict(zip(names, table.tolist(), strict=True)))
+    return started(scene, start)[0]
+
+
+def _clusters(scene: Scene, clusters: Sequence[int] | None) -> tuple[int, ...]:
+    """Return the cluster of each node, checked; by default nodes that start alike and stay alike by symmetry."""
+    equations = scene.equations
+    alone = tuple(range(scene.n))
+    if clusters is None:
+        if scene.n == 1 or equations.mixed or equations.differing:
+            return alone
+        rows = np.array([scene.initial[name] for name in scene.components])
+        try:
+            classes = quotient(equations, [tuple(column) for column in rows.T.tolist()])[1]
+            quotient_of(scene, classes, ())
+        except (NoQuotient, NoSynchrony, ValueError):
+            classes = tuple([0] * scene.n)
+            if len({tuple(column) for column in rows.T.tolist()}) > 1 or not _synchronous(scene):
+                return alone
+        return classes
+    numbers = list(clusters) if clusters is not None and not isinstance(clusters, str) else []
+    if len(numbers) != scene.n or not all(isinstance(each, Integral) for each in numbers):
+        raise ValueError(f"clusters = {short_repr(clusters)}; expected a whole number for each of {scene.n} nodes")
+    order = list(dict.fromkeys(numbers))
+    classes = tuple(order.index(each) for each in numbers)
+    if equations.mixed or equations.differing:
+        raise ValueError("clusters: found nodes or links that differ; expected equal ones; leave `clusters` out")
+    if len(order) > 1 and len(order) < scene.n and quotient(equations, classes)[1] != classes:
+        raise ValueError(
+            f"clusters = {short_repr(clusters)}: nodes of one cluster feel another one by different sums of weights; expected a "
+            "balanced partition, as `clusters(graph)` lists them"
+        )
+    return classes
+
+
+def _synchronous(scene: Scene) -> bool:
+    """Return whether all nodes can move alike."""
     try:
-        state = np.array(start, dtype=float)
-    except (TypeError, ValueError):
-        state = np.empty(0)
-    if state.ndim != 1 or len(state) not in (len(names), len(scene.components)) or not np.all(np.isfinite(state)):
-        raise ValueError(f"start: found {short_repr(start)}; expected a number for each of {', '.join(names)}")
-    return state[: len(names)]
+        quotient_of(scene, (0,) * scene.n, ())
+    except ValueError:
+        return False
+    return True
+
+
+def _quotient_state(scene: Scene, classes: tuple[int, ...], count: int) -> np.ndarray:
+    """Return the start of the quotient, without slip states: that of the first node of each cluster."""
+    names = [name for name in scene.components if name not in scene.equations.modes]
+    if count == scene.n:
+        size = len(names) * scene.n if scene.equations.sticks else scene.equations.dimension
+        return np.array(scene.y0)[:size]
+    first = [classes.index(k) for k in range(count)]
+    return np.array([scene.initial[name][i] for name in names for i in first], dtype=float)
+
+
+def _settled(flow: Flow, scene: Scene, state: np.ndarray) -> np.ndarray:
+    """Return the state of a driven network after the transient, at the beginning of a period of the drive."""
+    unit = scene.period or 1.0
+    left = round(scene.transient) if scene.time_unit == "period" else math.ceil(scene.transient / unit)
+    while left > 0:
+        some = min(left, TOGETHER)
+        state = flow.advance(scene.parameters, state[None], np.full(1, some * unit))[0]
+        left -= some
+    return state
+
+
+def _cycle(scene: Scene, classes: tuple[int, ...], flow: Flow, state: np.ndarray) -> tuple[Cycles, np.ndarray, int]:
+    """Follow an undriven motion to its attracting cycle."""
+    values, size = scene.parameters, flow.size
+    walker, rates = flow.motion(values, state)
+    turns = turns_of(walker, rates, drifts=not flow.equations.sticks)
+    walker, left = flow.motion(values, state)[0], max(round(scene.transient), 0)
+    while left > 0:
+        some = min(left, TOGETHER)
+        walker.advance(some * turns.time)
+        left -= some
+    settled = walker.state[0]
+    state = settled[:size]
+    if rests(rates, settled, REST, turns.extent):
+        at = ", ".join(f"{name} = {x:.6g}" for name, x in islice(zip(flow.equations.state, state, strict=False), 8))
+        raise ArithmeticError(f"no cycle: the motion comes to rest at {at}; `equilibrium` finds such states")
+    found = returns(lambda x: flow.motion(values, x)[0], rates, turns.extent, settled)
+    for time, extent in islice(found, RETURNS):
+        image = flow.advance(values, state[None], np.full(1, time))[0]
+        if not np.all(np.abs(image - state) <= NEAR * extent[:size]):
+            continue
+        problem = Cycles.near(scene, (), classes, state[None], time, 0)
+        z, _, steps = problem.solved()
+        if not (_accepted(problem, z) and abs(problem.period(z) - time) < 0.5 * time):
+            continue
+        problem, z = _least(problem, z)
+        # A conservative motion has a double multiplier 1, which errors of size TOLERANCE split.
+        if np.all(np.abs(problem.multipliers(z)) < 1.0 - APART * math.sqrt(TOLERANCE)):
+            return problem, z, steps
+        break
+    raise ArithmeticError(
+        f"no attracting cycle near the motion after {scene.transient:g} mean return times; start elsewhere, settle longer, or "
+        "give `start` and `period` of an unstable one"
+    )
+
+
+def _least(problem: Cycles, z: np.ndarray) -> tuple[Cycles, np.ndarray]:
+    """Return the orbit with its least period: test by one call whether a fraction of the period is one."""
+    state, period = problem.states(z)[0], problem.period(z)
+    parts = np.arange(RETURNS, 1, -1)
+    later = problem.flow.advance(problem.values(z), np.tile(state, (len(parts), 1)), period / parts)
+    for part, there in zip(parts.tolist(), later, strict=True):
+        if np.all(np.abs(there - state) <= math.sqrt(CLOSED) * problem.scale):
+            shorter = Cycles.near(problem.scene, (), problem.classes, state[None], period / part, 0)
+            solved, _, _ = shorter.solved()
+            if _accepted(shorter, solved) and abs(shorter.period(solved) * part - period) < NEAR * period:
+                return shorter, solved
+    return problem, z
+
+
+def _accepted(problem: Cycles, z: np.ndarray) -> bool:
+    """Return whether Newton's method has found an orbit."""
+    residual, _ = problem.linearise(z)
+    gaps = residual[: problem.phase.size].reshape(problem.phase.shape)
+    return bool(np.isfinite(gaps).all()) and closed(gaps, CLOSED * problem.scale, problem.states(z))
+
+
+def _described(problem: Cycles, orbit: PeriodicOrbit, z: np.ndarray) -> PeriodicOrbit:
+    """Return the orbit with a description of how its nodes move."""
+    scene = orbit.scene
+    if scene.n == 1 or scene.equations.mixed:
+        return orbit
+    looks = LOOKS if scene.n < MANY else FEWER_LOOKS
+    motion = problem.orbit_states(z, looks) @ expansion(scene.equations, orbit.classes, problem.flow.size).T
+    return replace(orbit, pattern=pattern_of(motion.reshape(looks, -1, scene.n), [*map(str, scene.topology.labels)]))
 
 
 def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
@@ -457,7 +333,7 @@ def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
     Parameters
     ----------
     orbit : PeriodicOrbit
-        Orbit of one oscillator.
+        Orbit of nodes that move alike.
     low, high : float
         Strengths alpha of a mode that grows at one of them and decays at the other.
 
@@ -485,41 +361,3 @@ def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
     if growth(low) * growth(high) > 0.0:
         raise ValueError(f"alpha: the mode grows, or decays, at {low} and at {high}; expected a change between them")
     return float(brentq(growth, low, high, xtol=1e-14, rtol=1e-14))
-
-
-def _strobe(
-    scene: Scene, state: np.ndarray, periods: int, alpha: float, free: float = 0.0, extent: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the state some periods later, and the propagator of a mode of strength alpha.
-
-    A period is that of the drive, or has the length `free`.
-    """
-    problem, first = _problem(scene, state, alpha, free or scene.period, extent)
-    propagators, logarithms, image = cycle_propagators(problem, first, periods)
-    if (size := float(logarithms[0, 0])) > 700.0:  # double precision ends at exp(709.8)
-        raise FloatingPointError(
-            f"multipliers: found a deviation that grows by exp({size:.3g}); expected exp(700) at most"
-        )
-    return image, propagators[0, 0] * math.exp(size)
-
-
-def _problem(
-    scene: Scene, state: np.ndarray, alpha: float, period: float | None, extent: np.ndarray | None = None
-) -> tuple[OrbitProblem, np.ndarray]:
-    """Return orbits with a mode of strength alpha in units of a period, and the state with its slip state.
-
-    Absolute tolerances follow the extent.
-    """
-    start, moves = np.zeros(len(scene.initial)), np.zeros(len(scene.initial))
-    start[: len(state)] = state
-    if extent is not None:
-        moves[: len(state)] = extent
-    turns = Turns(period or 2.0 * math.pi, moves, "period")
-    problem = OrbitProblem.of_modes(scene, np.array([alpha]), start[None], 1, turns)
-    return problem, problem.with_slip_states(start[None])[0]
-
-
-def _multipliers(matrix: np.ndarray) -> np.ndarray:
-    """Return the eigenvalues of a monodromy matrix, the largest first."""
-    multipliers = np.linalg.eigvals(matrix)
-    return np.asarray(multipliers[np.argsort(-np.abs(multipliers), kind="stable")])

@@ -16,7 +16,7 @@ Source: di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth Dynamical Sys
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -25,13 +25,13 @@ import numpy as np
 import sympy as sp
 from numpy.polynomial import Polynomial
 
-from synchain.models.graphs.families import topology
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.events import Event
 from synchain.models.scenes.scene import Scene
 
-from ..cells.run_keywords import ONE_CELL
+from ..cells.run_keywords import ONE_CELL, with_numbers
 from ..sweeps.run import run
+from .flow import TOLERANCE
 
 SAMPLES = 2000
 """Samples in each period of the drive (a choice)."""
@@ -55,25 +55,29 @@ class Phases:
         return ", ".join({0: "stick", 1: "slip +", -1: "slip -"}[mode] for mode in self.slip_states)
 
 
-def phases_of(scene: Scene, state: np.ndarray, periods: int) -> Phases | None:
-    """Determine the phases of a periodic orbit. Shapes: state (components,)."""
+def phases_of(scene: Scene, values: Mapping[str, float], state: np.ndarray, period: float) -> Phases | None:
+    """Determine the phases of a periodic orbit of one oscillator at some parameters. Shapes: state (components,)."""
     events = scene.equations.node.events
     if not events:
         return None
-    single = scene.replace(
+    samples = SAMPLES * max(1, round(period / (scene.period or period)))
+    single = with_numbers(
+        scene,
+        values,
         **{**ONE_CELL, "record": ("trajectory",)},
-        topology=topology("chain", 1),
-        samples=SAMPLES * periods + 1,
+        samples=samples + 1,
         transient=0.0,
-        window=float(periods),
-        time_unit="period",
-        initial={"x": [float(state[0])], "v": [float(state[1])]},
+        window=period,
+        time_unit="time",
+        initial={"x": float(state[0]), "v": float(state[1])},
+        rtol=TOLERANCE,
+        atol=None,
     )
     once = np.asarray(run(single, show_progress=False, workers=1).trajectory.sel(node=1).values, dtype=float)[:-1]
     # Two cycles, so that each phase is complete in one of them: path (2 cycle, components x, v, slip).
     path = np.concatenate([once, once])
-    t, slip = np.arange(len(path)) * ((scene.period or 0.0) / SAMPLES), np.round(path[:, 2]).astype(int)
-    load_margin, sliding_speed = _margins(scene, events[0])
+    t, slip = np.arange(len(path)) * (period / samples), np.round(path[:, 2]).astype(int)
+    load_margin, sliding_speed = _margins(single, events[0])
     margin = np.where(slip == 0, load_margin(path[:, 0], t), slip * sliding_speed(path[:, 1]))
     changes = np.flatnonzero(slip[1:] != slip[:-1]) + 1
     if len(changes) == 0:

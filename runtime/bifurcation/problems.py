@@ -50,7 +50,14 @@ class Problem(Protocol):
 
     names: tuple[str, ...]
     point: np.ndarray  # (size + 1,): the last accepted solution
-    weights: np.ndarray  # (size + 1,): lengths are norms of `weights * dz`
+
+    @property
+    def weights(self) -> np.ndarray:
+        """The metric (size + 1,): lengths are norms of `weights * dz`."""
+
+    @property
+    def kinked(self) -> bool:
+        """True if the branch may have kinks, as under set-valued friction."""
 
     def linearise(self, z: np.ndarray) -> tuple[np.ndarray, Matrix]:
         """Return R (size,) and its derivative (size, size + 1); ArithmeticError where there is no value."""

@@ -19,7 +19,7 @@ from ..results.labels import STATE, States
 from ..support.error_text import range_text
 from .equilibrium import Equilibrium
 from .kinds import BifurcationKind
-from .periodic import PeriodicOrbit
+from .periodic_result import PeriodicOrbit
 from .phases import Phases
 
 if TYPE_CHECKING:

@@ -28,15 +28,14 @@ from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.run_keywords import Given, chosen, with_numbers
 from ..results.labelled import Labelled, dataset
-from ..stability.exponents import coupled_cell
 from ..stability.orbits import OrbitProblem, driven_states, within
 from ..support.arrays import row
 from ..support.execution import Execution
 from ..support.progress import Hook
-from .branches import warn_of_lost
-from .kinds import BifurcationKind
-from .orbit_tracer import checked_values, others, traced
-from .periodic import NEWTON, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit, relative, whole_turns
+from .branches import checked_values, follow
+from .flow import TOLERANCE
+from .periodic import NEWTON, check_periods, periodic_orbit
+from .periodic_result import PeriodicOrbit, whole_turns
 from .results import Branch
 
 Range = tuple[float, float]
@@ -54,9 +53,6 @@ MOST_STEPS = 100_000
 
 LOOSE = 1e-8
 """Relative tolerance of these motions: returns are searched to CLOSE only (a choice)."""
-
-NEARER = 4
-"""The other sheet at a fold is entered at 4^-NEARER of the distance between fold and last orbit (a choice)."""
 
 CLOSE, APART, TRIES = 0.05, 0.02, 12
 """Largest distance of a return and least distance between starts, relative to the extent of the motion, and most starts
@@ -211,7 +207,10 @@ def skeleton(
     grid = sorted(checked_values(check_scene(scene), name, values))
     if isinstance(periods, Integral | str) or len(periods) == 0:
         raise ValueError(f"periods = {short_repr(periods)}; expected numbers of drive periods, e.g. (1, 2)")
-    scene = coupled_cell(Given(skeleton), others(Given(skeleton, parameters, more, NEWTON), scene, name), TOLERANCE)
+    given = Given(skeleton, parameters, more, NEWTON)
+    if name in given.values:
+        raise ValueError(f"skeleton: {name!r} takes its values one after the other; expected others")
+    scene = given.scene(scene, rtol=TOLERANCE).lone
     if not isinstance(looks, Integral) or looks < 1:
         raise ValueError(f"looks = {short_repr(looks)}; expected a whole number, at least 1")
     for each in periods:
@@ -225,14 +224,6 @@ def skeleton(
     branches: list[Branch] = []
     searched: list[np.ndarray] = []
 
-    def take(k: int, orbit: PeriodicOrbit) -> None:
-        """Follow an orbit at grid[k] that is new, and the other sheets at the folds of its branch."""
-        if any(_passes(branch, grid[k], orbit) for branch in branches):
-            return
-        branches.append(_both_ways(scene, name, grid, k, orbit))
-        for end, other in _other_sheets(scene, branches[-1]):
-            take(grid.index(end), other)
-
     # Search at evenly spread values: the middles of `count` equal parts of the grid.
     count = min(looks, len(grid))
     looked_at = sorted({int((2 * j + 1) * len(grid) / (2 * count)) for j in range(count)})
@@ -243,8 +234,8 @@ def skeleton(
             states = starts_of(one, seed, box)
             searched.append(states)
             for orbit in near_returns(one, periods, transient, states):
-                take(k, orbit)
-    warn_of_lost("skeleton", branches)
+                if not any(_passes(branch, grid[k], orbit) for branch in branches):
+                    branches.append(follow(orbit, name, values=grid) if len(grid) > 1 else _single(name, orbit))
     # The box around all starts, by component.
     low, high = (of(np.concatenate(searched), axis=0).tolist() for of in (np.min, np.max))
     names = (component for component in scene.components if component not in scene.equations.modes)
@@ -372,7 +363,7 @@ def _returning(scene: Scene, path: np.ndarray, extent: np.ndarray, periods: int)
         if gap[k, motion] > CLOSE or len(starts) == TRIES:
             break
         state = path[k, motion] - whole_turns(scene, path[k, motion] - first)
-        if all(relative(state - start, np.minimum(size[motion], its)) > APART for start, its in starts):
+        if all(np.abs((state - start) / np.minimum(size[motion], its)).max() > APART for start, its in starts):
             starts.append((state, size[motion]))
     return [state for state, _ in starts]
 
@@ -395,40 +386,7 @@ def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
     return alike and any(_same(orbit, branch.orbits[k]) for k in np.flatnonzero(branch.values == value))
 
 
-def _both_ways(scene: Scene, name: str, grid: list[float], k: int, orbit: PeriodicOrbit) -> Branch:
-    """Follow an orbit at grid[k] up and down, and join both parts to one branch that rises in the parameter."""
-    up, down = (traced(scene, name, part, orbit, grid[-1] - grid[0]) for part in (grid[k:], grid[k::-1]))
-    return Branch(
-        name,
-        np.concatenate([down.values[:0:-1], up.values]),
-        (*down.orbits[:0:-1], *up.orbits),
-        (*down.bifurcations[::-1], *up.bifurcations),
-        np.concatenate([down.growing[:0:-1], up.growing]),
-        np.concatenate([down.lengths[:0:-1], up.lengths]),
-        (*down.phases[:0:-1], *up.phases),
-        (*down.lost, *up.lost),
-    )
-
-
-def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrbit]]:
-    """Return the values of a branch's ends at folds, with the orbits of the other sheets there."""
-    sheets = []
-    for turn in branch.bifurcations:
-        if turn.kind is not BifurcationKind.FOLD:
-            continue
-        fold = turn.value
-        for k, inner in ((0, fold < branch.values[0]), (-1, fold > branch.values[-1])):
-            if not inner:
-                continue
-            end, last = float(branch.values[k]), branch.orbits[k]
-            # Near a fold both sheets lie at distances +-c sqrt|p - p_fold| from it: at 4^-j of the way, 2^-j of the
-            # distance.
-            values = [fold + 4.0**-j * (end - fold) for j in range(NEARER, -1, -1)]
-            try:
-                start = turn.solution.state - 2.0**-NEARER * (last.state - turn.solution.state)
-                first = periodic_orbit(scene, last.periods, start, parameters={branch.name: values[0]})
-                sheet = traced(scene, branch.name, values, first, abs(end - fold))
-            except ArithmeticError:
-                continue
-            sheets += [(end, sheet.orbits[-1])] if len(sheet.orbits) == len(values) else []
-    return sheets
+def _single(name: str, orbit: PeriodicOrbit) -> Branch:
+    """Return a branch of one orbit."""
+    value, growing = np.array([orbit.scene.parameters[name]]), np.array([orbit.growing])
+    return Branch(name, value, (orbit,), (), growing, np.zeros(1))

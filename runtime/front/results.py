@@ -20,7 +20,7 @@ HOMES = {
     "Lyapunov": "runtime.stability.lyapunov",
     "Mismatch": "runtime.synchronisation.mismatch",
     "MSF": "runtime.stability.msf",
-    "PeriodicOrbit": "runtime.bifurcation.periodic",
+    "PeriodicOrbit": "runtime.bifurcation.periodic_result",
     "Plane": "runtime.stability.msf",
     "Probe": "runtime.synchronisation.probe",
     "Progress": "runtime.support.progress",

@@ -1,6 +1,6 @@
 # What the module loads on first use; tests/test_front.py writes this file with --update.
 from synchain.runtime.bifurcation.equilibrium import Equilibrium as Equilibrium
-from synchain.runtime.bifurcation.periodic import PeriodicOrbit as PeriodicOrbit
+from synchain.runtime.bifurcation.periodic_result import PeriodicOrbit as PeriodicOrbit
 from synchain.runtime.bifurcation.results import Bifurcation as Bifurcation
 from synchain.runtime.bifurcation.results import Branch as Branch
 from synchain.runtime.bifurcation.results import Curve as Curve

@@ -21,7 +21,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.models.sweeps.axis import Axis
 
 from ..bifurcation.kinds import BifurcationKind
-from ..bifurcation.periodic import PeriodicOrbit
+from ..bifurcation.periodic_result import PeriodicOrbit
 from ..bifurcation.results import Branch
 from ..bifurcation.skeleton import skeleton
 from ..plots.branch_marks import MARK, MARKERS, STABLE, UNSTABLE

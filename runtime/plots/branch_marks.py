@@ -11,7 +11,7 @@ MARKERS = {
     BifurcationKind.FOLD: "s",
     BifurcationKind.BRANCH_POINT: "D",
     BifurcationKind.HOPF: "*",
-    BifurcationKind.NEIMARK_SACKER: "p",
+    BifurcationKind.TORUS: "p",
     BifurcationKind.GRAZING: "^",
     BifurcationKind.STICK_LOSS: "v",
 }

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from synchain.models.inputs.checks import check_text
 
 from ..bifurcation.equilibrium import Equilibrium
-from ..bifurcation.periodic import PeriodicOrbit
+from ..bifurcation.periodic_result import PeriodicOrbit
 from ..bifurcation.results import Branch, Curve
 from ..sweeps.run import run
 from .branch_marks import MARK, MARKERS, STABLE, UNSTABLE

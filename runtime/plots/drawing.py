@@ -10,12 +10,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from synchain.models.graphs.topology import Topology
 from synchain.models.inputs.display import HasPlot
 from synchain.models.spectra.spectrum import Spectrum
 
 from ..bifurcation.equilibrium import Equilibrium
-from ..bifurcation.periodic import PeriodicOrbit
+from ..bifurcation.periodic_result import PeriodicOrbit
 from ..bifurcation.results import Branch, Curve, Diagram
 from ..bifurcation.skeleton import Skeleton
 from ..results.result import Result
@@ -42,6 +41,9 @@ from .style import BLACK, BLUE, GREEN, GREY, ORANGE, bands, note, symbol
 
 SAMPLES = 400
 """Points per drive period of a drawn orbit: enough for a smooth curve."""
+
+COLOURS = (BLUE, GREEN, BLACK, GREY)
+"""Colours of the nodes of an orbit."""
 
 DOTS: dict[str, Any] = {"linestyle": "none", "marker": "."}
 """Style of points without a line."""
@@ -182,25 +184,26 @@ def _(value: Equilibrium, axes: Axes, **style: Any) -> Axes:
 
 @_draw.register
 def _(value: PeriodicOrbit, axes: Axes, **style: Any) -> Axes:
-    """Draw the closed curve of the first two components, with a dot at the start of each period."""
-    # integrate one node without links over the period of the orbit
-    start = {name: [x] for name, x in zip(value.components, value.state.tolist(), strict=True)}
-    of_node = {symbol.name for node in value.scene.equations.nodes for symbol in node.parameters}
+    """Draw the closed curve of the first two components of each node, with a dot at the start of each period."""
+    components, nodes = len(value.components), value.scene.n
     one = value.scene.replace(
-        topology=Topology("one", 1, ()),
-        parameters={name: x for name, x in value.scene.parameters.items() if name in of_node},
         record=("trajectory",),
         samples=SAMPLES * value.periods,
         transient=0.0,
         window=value.period,
         time_unit="time",
-        initial=start,
+        initial={name: value.data.state.sel(component=name).values.tolist() for name in value.components},
+        rtol=1e-12,
     )
-    path = run(one, show_progress=False, workers=1).trajectory.sel(node=1)
-    names = value.components[0], value.components[min(1, len(value.components) - 1)]
-    axes.plot(*(path.sel(component=name) for name in names), **line_style(style, color=BLUE))
-    points = value.points
-    axes.plot(points[:, 0], points[:, min(1, points.shape[1] - 1)], **DOTS, markersize=6.0, color=ORANGE)
+    trajectory = run(one, show_progress=False, workers=1).trajectory
+    names = value.components[0], value.components[min(1, components - 1)]
+    points = value.points.reshape(value.periods, components, nodes)
+    # nodes that move alike are drawn once
+    for node in sorted({value.classes.index(k) for k in value.classes}):
+        path = trajectory.isel(node=node)
+        colour = COLOURS[node % len(COLOURS)]
+        axes.plot(*(path.sel(component=name) for name in names), **line_style(style, color=colour))
+        axes.plot(points[:, 0, node], points[:, min(1, components - 1), node], **DOTS, markersize=6.0, color=ORANGE)
     axes.set(xlabel=symbol(names[0]), ylabel=symbol(names[1]))
     return axes
 

@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
 
-from .motion import path, rests, shortest_time
+from .motion import OrbitIntegrator, RateFunctions, path, rests, shortest_time
 from .orbits import OrbitProblem
 from .variational_integrator import VariationalIntegrator
 
@@ -57,7 +58,7 @@ def limit_cycle(problem: OrbitProblem, start: np.ndarray, closed: float) -> Cycl
     alone = replace(problem, strengths=np.zeros_like(problem.strengths[:1]))
     if rests(problem.rates, start, closed, problem.extent):
         return None
-    for time, extent in islice(_returns(alone, start), RETURNS):
+    for time, extent in islice(returns(partial(_integrator, alone), alone.rates, alone.extent, start), RETURNS):
         cycle = _newton(alone, start, time, extent, closed)
         if cycle is not None:
             cycle = _least(alone, cycle, extent, closed)
@@ -70,17 +71,22 @@ def limit_cycle(problem: OrbitProblem, start: np.ndarray, closed: float) -> Cycl
     return None
 
 
-def _returns(problem: OrbitProblem, start: np.ndarray) -> Iterator[tuple[float, np.ndarray]]:
-    """Yield each return of the orbit through the plane normal to its motion: the time, and the extent (p,) so far."""
-    rates, integrator, time = problem.rates, _integrator(problem, start), 0.0
-    normal = rates.values(start) / _scale(problem.extent) ** 2  # normal in units of the extent of each component
+def returns(
+    begin: Callable[[np.ndarray], OrbitIntegrator], rates: RateFunctions, extent: np.ndarray, start: np.ndarray
+) -> Iterator[tuple[float, np.ndarray]]:
+    """Yield each return of the orbit through the plane normal to its motion: the time, and the extent (p,) so far.
+
+    `begin` returns an integrator that begins at a state; `extent` (p,) is that of the motion.
+    """
+    integrator, time = begin(start), 0.0
+    normal = rates.values(start) / _scale(extent) ** 2  # normal in units of the extent of each component
 
     def side(state: np.ndarray) -> float:
         return float(normal @ (state[0] - start))
 
-    for before, step, extent, _ in islice(path(integrator, rates, shortest_time(rates, start)), SAMPLES):
+    for before, step, moved, _ in islice(path(integrator, rates, shortest_time(rates, start)), SAMPLES):
         if side(before) < 0.0 <= side(integrator.state):
-            yield time + _passage(integrator, before, step, side), np.maximum(extent, NEAR * problem.extent)
+            yield time + _passage(integrator, before, step, side), np.maximum(moved, NEAR * extent)
         time += step
 
 
@@ -97,7 +103,7 @@ def _integrator(problem: OrbitProblem, state: np.ndarray) -> VariationalIntegrat
 
 
 def _passage(
-    integrator: VariationalIntegrator, before: np.ndarray, step: float, side: Callable[[np.ndarray], float]
+    integrator: OrbitIntegrator, before: np.ndarray, step: float, side: Callable[[np.ndarray], float]
 ) -> float:
     """Return the time within the last step at which the orbit crossed a plane."""
     after = integrator.state

@@ -273,12 +273,13 @@ def shortest_time(rates: RateFunctions, state: np.ndarray) -> float:
     return FIRST * float(min(times, default=1.0 / FIRST))
 
 
-def turns_of(integrator: OrbitIntegrator, rates: RateFunctions, hidden: int = 0) -> Turns:
+def turns_of(integrator: OrbitIntegrator, rates: RateFunctions, hidden: int = 0, drifts: bool = True) -> Turns:
     """Measure the mean return time of an undriven orbit, or the slowest rate of the equilibrium that the orbit reaches.
 
     A motion with constant rates, such as that of locked phases, counts as an equilibrium that drifts. A turn of a
     component lasts from one maximum to the next; between them the component falls and rises by at least CLEAR times its
     extent. The component with the most turns gives the time. Only the later three quarters of a path are searched.
+    Without `drifts` constant rates count as motion, such as that of a body in stick on a moving ground.
     """
     count = integrator.state.shape[1] - hidden
     start = integrator.state[0, :count].copy()
@@ -299,13 +300,14 @@ def turns_of(integrator: OrbitIntegrator, rates: RateFunctions, hidden: int = 0)
                     break
                 if k % LOOKED == 0 and _mean_turn(np.array(times[k // 4 :]), np.array(states[k // 4 :]), ENOUGH):
                     break
-                if k % OFTEN == 0 and _drift(rates, times, states, velocities, extent, closed) is not None:
+                if drifts and k % OFTEN == 0 and _drift(rates, times, states, velocities, extent, closed) is not None:
                     break
         except FloatingPointError:  # the transient raises the error for an unbounded motion
             pass
     # subtract an even drift, such as that of locked phases: only the approach to the drift counts as motion
     at_rest = rests(rates, states[-1], REST, extent)
-    even = np.zeros_like(start) if at_rest else _drift(rates, times, states, velocities, extent, closed)
+    drift = _drift(rates, times, states, velocities, extent, closed) if drifts else None
+    even = np.zeros_like(start) if at_rest else drift
     early, path_states = len(times) // 4, np.array(states)
     if even is not None:
         path_states = path_states - np.outer(times, even)

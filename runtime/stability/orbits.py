@@ -275,9 +275,10 @@ def _joined(scene: Scene, strengths: np.ndarray) -> Scene:
 
     ValueError for a strength that is not 0.
     """
-    first = next(iter(scene.initial))
+    first, second = (*scene.initial, *scene.initial)[:2]
     if not np.any(strengths):
-        return pair_of(scene, coupling=f"{first}->{first}")
+        # with set-valued friction links must be forces
+        return pair_of(scene, coupling=f"{first}->{second if scene.equations.sticks else first}")
     try:
         pair_of(scene)
     except ValueError as error:

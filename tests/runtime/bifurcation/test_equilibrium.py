@@ -209,7 +209,7 @@ def test_set_valued_friction_rests_in_whole_ranges() -> None:
 
 def test_a_motion_that_comes_to_rest_is_no_periodic_orbit() -> None:
     scene = sc.Scene(sc.Field({"x": "v", "v": "-v - x + 1"}), "x->x")
-    with pytest.raises(ArithmeticError, match=r"comes to rest at x = 1, v = .*`equilibrium` finds such states"):
+    with pytest.raises(ArithmeticError, match=r"comes to rest at x_1 = 1, v_1 = .*`equilibrium` finds such states"):
         sc.periodic_orbit(scene)
     np.testing.assert_allclose(sc.equilibrium(scene).state, [1.0, 0.0], atol=1e-14)
 

@@ -123,7 +123,7 @@ def test_every_kind_is_drawn_into_given_axes(name: str) -> None:
 def test_an_orbit_is_drawn_as_a_closed_curve() -> None:
     from synchain.runtime.bifurcation.periodic import periodic_orbit
 
-    scene = Scene(oscillator="duffing", topology=topology("chain", 2), parameters={"delta": 0.2, "omega": 1.3})
+    scene = Scene(oscillator="duffing", parameters={"delta": 0.2, "omega": 1.3})
     orbit = periodic_orbit(scene)
     ax = orbit.plot(plt.figure().add_subplot())
     x, v = ax.lines[0].get_data()

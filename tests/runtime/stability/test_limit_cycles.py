@@ -13,7 +13,7 @@ import pytest
 from catalogue import VAN_DER_POL
 from scipy.integrate import solve_ivp
 
-from synchain import Field, Scene, exponents, follow, msf, open_result, periodic_orbit
+from synchain import Field, Scene, exponents, msf, open_result, periodic_orbit
 from synchain.graphs import chain
 from synchain.runtime.stability.orbits import OrbitProblem
 
@@ -66,8 +66,6 @@ def test_a_drive_of_amplitude_zero_is_none() -> None:
     assert cycle.period == pytest.approx(period, rel=1e-9)
     result = exponents(shipped, [0.0, 0.1, 0.5], starts=1, rtol=1e-9)
     np.testing.assert_allclose(result.exponent, expected, atol=1e-8)
-    with pytest.raises(ArithmeticError, match="no orbit of 1 drive period"):
-        periodic_orbit(shipped, u=0.01)
 
 
 @pytest.mark.parametrize(("omega", "centre"), [(0.02, 0.0), (2.0, 0.0), (1e3, 0.0), (1.0, 1e3)])
@@ -114,19 +112,17 @@ def test_windows_of_a_cycle_begin_at_zero() -> None:
 
 def test_periodic_orbits_of_undriven_oscillators(tmp_path: Path) -> None:
     period, (_, weak, strong) = floquet(1.0)
-    orbit = periodic_orbit(pair(1.0))
+    orbit = periodic_orbit(pair(1.0).lone)
     assert orbit.period == pytest.approx(period, rel=1e-10)
     assert orbit.stable
     assert orbit.multipliers[0] == pytest.approx(1.0, abs=1e-10)
     for alpha, exponent in ((0.1, weak), (0.5, strong)):
-        largest = abs(orbit.transversal_multipliers(alpha)[0])
+        largest = abs(periodic_orbit(pair(1.0)).transversal_multipliers(alpha)[0])
         assert np.log(largest) / orbit.period == pytest.approx(exponent, abs=1e-10)
     orbit.save(tmp_path / "orbit.nc")
     again = open_result(tmp_path / "orbit.nc")
     assert (again.period, again.stable) == (orbit.period, True)
     assert "period " in str(again)
-    with pytest.raises(ValueError, match="first: found the limit cycle of an oscillator without a drive"):
-        follow(pair(1.0), "mu", [1.0, 1.2], orbit)
 
 
 @pytest.mark.filterwarnings("error")
@@ -152,8 +148,12 @@ def test_a_return_that_fails_leads_to_the_next_and_to_the_least_period(monkeypat
         return propagators(orbit, integrator, units)
 
     expected = periodic_orbit(pair(1.0)).period
+
+    def cycle() -> float:
+        return exponents(pair(1.0), [0.0], starts=1, rtol=1e-9).attractors[0].cycle
+
     monkeypatch.setattr(OrbitProblem, "propagators", fails_twice)
-    assert periodic_orbit(pair(1.0)).period == pytest.approx(expected, rel=1e-10)
+    assert cycle() == pytest.approx(expected, rel=1e-8)
     np.testing.assert_allclose(failed, [expected, 2.0 * expected], rtol=1e-6)
 
 
@@ -164,7 +164,7 @@ def test_a_return_that_fails_leads_to_the_next_and_to_the_least_period(monkeypat
         (pair(1.0), {"start": [1.0]}, ValueError, "expected a number for each of x, v"),
         (Scene("rossler", "x->x", chain(2)), {}, ArithmeticError, "near the motion after 300 mean return times; start"),
         (Scene("pendulum", topology=chain(2)), {}, ArithmeticError, "no attracting cycle near the motion"),
-        (pair(-1.0), {}, ArithmeticError, "no cycle: the motion comes to rest at x = 0, v = "),
+        (pair(-1.0), {}, ArithmeticError, "no cycle: the motion comes to rest at x_1 = "),
     ],
 )
 def test_what_has_no_attracting_cycle(scene: Scene, more: dict[str, Any], error: type, message: str) -> None:

@@ -9,7 +9,8 @@ import pytest
 
 import synchain as sc
 
-LONE, PAIR = sc.Scene("fitzhugh_nagumo"), sc.Scene("fitzhugh_nagumo", "x->x", sc.graphs.chain(2))
+LONE = sc.Scene("fitzhugh_nagumo")
+PAIR = sc.Scene("fitzhugh_nagumo", "x->x", sc.graphs.chain(2), initial={"x": 0.3})
 
 
 def test_strength_zero_needs_no_link() -> None:

@@ -1,0 +1,518 @@
+"""Periodic orbits as a problem that `arclength` solves and follows: multiple shooting.
+
+The unknowns are the states x_1 … x_m at the beginning of m segments of equal time, the distances by which shifts have
+moved, the period T if no drive prescribes it, and the parameter p.  The equations are flow(x_i, T/m) = x_(i+1), with the
+whole turns of angles and the shifts added after the last segment, and conditions that fix phase and shifts.
+
+* Segments.  More segments are taken where deviations grow by more than GROWTH in one.  With a drive each begins at a
+  period of the drive.
+* Drive.  If the parameter moves the drive's period, the column by p has the further term f dT/dp.
+* Multipliers.  The flow direction f and the shifts are neutral.  They are removed from every segment before the product
+  is formed, so that no other multiplier near 1 is disturbed: it stays smooth through folds and branch points.
+* Clusters.  Nodes that move alike are one node of the quotient network.  The multipliers of the differences within
+  clusters belong to the modes of the graph for complete synchronisation, else to the whole network.
+
+Sources: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapter 7; Kuznetsov, Elements of
+Applied Bifurcation Theory, 3rd ed. (Springer, 2004), chapter 10.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+import sympy as sp
+from scipy import linalg
+
+from synchain.models.dynamics.angles import periods_of_states
+from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.periodicity import angular_frequency
+from synchain.models.dynamics.reduction import collapse, quotient, without_drive
+from synchain.models.dynamics.synchrony import synchronous_node
+from synchain.models.scenes.scene import Scene
+
+from ..cells.drive_times import periods
+from ..cells.run_keywords import with_numbers
+from .arclength import Point
+from .equilibrium import Equilibrium
+from .flow import TOLERANCE, Flow, Image, flow_of
+from .kinds import BifurcationKind
+from .periodic_result import PeriodicOrbit, sorted_by_size
+from .problems import Critical
+from .products import null_vectors, product_eigenvalues
+from .transversal import Transversal, expansion
+
+GROWTH = 1e3
+"""Largest growth of a deviation in a segment (a choice)."""
+
+MOST_SEGMENTS = 64
+"""Most segments of an undriven cycle (a choice)."""
+
+LOOKS = 16
+"""States on the orbit from which the extents of the motion are measured (a choice)."""
+
+RESCALED = 2.0
+"""The extents are measured again where the rates change by this factor (a choice)."""
+
+NOISE = 3.0
+"""Integration error of an image that counts as zero, in units of the tolerance and the size of the motion (a choice)."""
+
+MOST_STEPS, ASTRAY = 30, 1e4
+"""Most steps of Newton's method at fixed parameters, and how far it may go in units of the motion (choices)."""
+
+BORN = 1e-3
+"""Cycles whose amplitude, or whose two halves' difference, is below this part of the motion are born there: the place of
+birth is located to the square root of rounding (a choice)."""
+
+NEAR = 1e-3
+"""A gap, in units of the motion, from which Newton's method must reduce it in every step (a choice)."""
+
+REAL = 1e-7
+"""Multipliers with a smaller imaginary part, relative to their modulus, count as real."""
+
+
+@dataclass(slots=True)
+class Cycles:
+    """Periodic orbits of a network, or of its quotient by clusters; the last unknown is the parameter `names[0]`."""
+
+    scene: Scene  # the network
+    names: tuple[str, ...]
+    classes: tuple[int, ...]  # the cluster of each node
+    flow: Flow  # of the quotient
+    periods: int  # drive periods of an orbit; 0 without a drive
+    turns: np.ndarray  # (n,): what is added to each state in a period, whole turns of angles
+    shifts: np.ndarray  # (n, k): directions in which all rates are the same
+    point: np.ndarray
+    scale: np.ndarray  # (n,): extent of each state
+    span: float  # the unit of the parameter
+    phase: np.ndarray  # (m, n): the direction of the motion at the reference; the unknowns move across it
+    transversal: Transversal | None = None
+    speed: float = math.nan  # size of the rates where the extents were measured
+    last: tuple[bytes, Image, np.ndarray] | None = field(default=None, repr=False)
+    driven: tuple[tuple[float, ...] | None, float] = field(
+        default=(None, 0.0), repr=False
+    )  # parameters and period of an orbit
+
+    @classmethod
+    def of(cls, orbit: PeriodicOrbit, *names: str) -> Cycles:
+        """Return the problem of a periodic orbit along parameters."""
+        count = len(set(orbit.classes))
+        copies = expansion(orbit.scene.equations, orbit.classes, len(orbit.state) * count // orbit.scene.n)
+        state = copies.T @ orbit.state / copies.sum(axis=0)
+        return cls.near(
+            orbit.scene, names, orbit.classes, state[None], orbit.period, 0 if orbit.free else orbit.periods
+        )
+
+    @classmethod
+    def near(
+        cls,
+        scene: Scene,
+        names: Sequence[str],
+        classes: Sequence[int],
+        states: np.ndarray,
+        period: float,
+        drive_periods: int,
+    ) -> Cycles:
+        """Return the problem near an orbit of a network. Shapes: states (m, n) of the quotient, period of the whole orbit."""
+        equations = quotient_of(scene, classes, names)
+        flow = flow_of(scene, equations, names, states[0])
+        size, values = flow.size, scene.parameters
+        numbers = [values[name] for name in names]
+        point = np.concatenate([states.ravel(), [] if drive_periods else [period], numbers])
+        span = abs(numbers[-1]) if numbers and numbers[-1] else 1.0
+        problem = cls(
+            scene, tuple(names), tuple(classes), flow, drive_periods, np.zeros(size), np.zeros((size, 0)), point,
+            np.ones(size), span, np.zeros_like(states), Transversal.of(scene, tuple(classes)),
+        )  # fmt: skip
+        problem.turns = problem._whole_turns(states, period)
+        problem._rescale(point)
+        problem._refer(point)
+        return problem
+
+    @classmethod
+    def at_hopf(cls, rest: Equilibrium, name: str, vector: np.ndarray, frequency: float) -> tuple[Cycles, Point]:
+        """Return the cycles that are born at a Hopf point, and their first point. Shapes: vector (states,) complex."""
+        classes = _classes_of(rest.scene, np.stack([rest.state, vector.real, vector.imag]))
+        # Real and imaginary part of the eigenvector are orthogonal; the phase of the cycle is fixed across the second.
+        vector = vector * np.exp(-0.5j * np.angle(np.sum(vector**2)))
+        copies = expansion(rest.scene.equations, classes, len(vector) * len(set(classes)) // rest.scene.n)
+        state, wave = ((copies.T @ each) / copies.sum(axis=0) for each in (rest.state, vector))
+        problem = cls.near(rest.scene, (name,), classes, state[None], 2.0 * math.pi / frequency, 0)
+        size = float(np.abs(state).max()) or 1.0
+        problem.scale = size * np.maximum(np.abs(wave) / np.abs(wave).max(), 1e-3)
+        problem.phase = (-wave.imag / problem.scale / np.linalg.norm(wave.imag / problem.scale))[None]
+        problem.speed = 0.0
+        return problem, problem.start(wave.real)
+
+    @classmethod
+    def leaving(cls, orbit: PeriodicOrbit, name: str, vector: np.ndarray, factor: int) -> tuple[Cycles, Point]:
+        """Return the branch that leaves an orbit along a direction (states,), and its first point.
+
+        `factor` is the number of periods in a period of the new branch: 2 at a period doubling.
+        """
+        classes = _classes_of(orbit.scene, np.stack([orbit.state, vector]))
+        copies = expansion(orbit.scene.equations, classes, len(vector) * len(set(classes)) // orbit.scene.n)
+        state, direction = ((copies.T @ each) / copies.sum(axis=0) for each in (orbit.state, vector))
+        drive_periods = 0 if orbit.free else orbit.periods * factor
+        states = np.tile(state, (factor, 1))
+        problem = cls.near(orbit.scene, (name,), classes, states, orbit.period * factor, drive_periods)
+        return problem, problem.start(direction)
+
+    def start(self, direction: np.ndarray) -> Point:
+        """Return the reference with a tangent along a direction (n,) of the first state; that of others follows the flow."""
+        tangent, moved = np.zeros(len(self.point)), direction
+        image, _ = self._image(self.point)
+        for i in range(self.segments):
+            tangent[i * len(direction) : (i + 1) * len(direction)] = moved
+            moved = image.propagators[i] @ moved
+        return Point(self.point, tangent / float(np.linalg.norm(self.weights * tangent)), 0)
+
+    # --- unknowns ---
+    @property
+    def segments(self) -> int:
+        """Number of segments."""
+        return len(self.phase)
+
+    @property
+    def kinked(self) -> bool:
+        """True with set-valued friction: the states have a kink where the beginning passes from stick to slip."""
+        return self.flow.equations.sticks
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Lengths: root mean squares of states in units of their extents, logarithms of periods, parameters by their span."""
+        m, n = self.phase.shape
+        states = np.tile(1.0 / (self.scale * math.sqrt(m * n)), m)
+        shifts = np.full(self.shifts.shape[1], 1.0 / float(self.scale.max()))
+        period = [] if self.periods else [1.0 / self.point[-1 - len(self.names)]]
+        return np.concatenate([states, shifts, period, np.full(len(self.names), 1.0 / self.span)])
+
+    def set_ranges(self, ranges: np.ndarray) -> None:
+        """Set the lengths by which parameters are measured."""
+        self.span = float(ranges[-1])
+
+    def states(self, z: np.ndarray) -> np.ndarray:
+        """Return the states (m, n) at the beginning of the segments."""
+        return z[: self.phase.size].reshape(self.phase.shape)
+
+    def values(self, z: np.ndarray) -> dict[str, float]:
+        """Return the parameters at a solution."""
+        return {
+            **self.scene.parameters,
+            **dict(zip(self.names, map(float, z[len(z) - len(self.names) :]), strict=True)),
+        }
+
+    def period(self, z: np.ndarray) -> float:
+        """Return the period at a solution."""
+        return self._drive_period(self.values(z)) if self.periods else float(z[-1 - len(self.names)])
+
+    def _drive_period(self, values: Mapping[str, float]) -> float:
+        """Return the period of an orbit of a driven network; the last one is kept."""
+        numbers = tuple(values[name] for name in self.scene.equations.parameters)
+        if self.driven[0] != numbers:
+            self.driven = numbers, self.periods * float(periods(self.scene.equations, np.array([numbers]))[0])
+        return self.driven[1]
+
+    def _period_slope(self, values: Mapping[str, float]) -> float:
+        """Return the derivative of the drive's period by the parameter."""
+        slope = _frequency_slope(self.scene.equations, self.names[-1]) if self.names else None
+        if slope is None:
+            return 0.0
+        numbers = [values[name] for name in self.scene.equations.parameters]
+        return -self._drive_period(values) * float(slope(*numbers))
+
+    # --- equations ---
+    def linearise(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the gaps of all segments and the conditions, with their derivatives."""
+        (m, n), shifts = self.phase.shape, self.shifts.shape[1]
+        image, rates = self._image(z)
+        values, states = self.values(z), self.states(z)
+        residual, matrix = np.zeros(len(z) - len(self.names)), np.zeros((len(z) - len(self.names), len(z)))
+        for i in range(m):
+            rows, following = slice(i * n, i * n + n), (i + 1) % m
+            residual[rows] = image.states[i] - states[following]
+            matrix[rows, rows] += image.propagators[i]
+            matrix[rows, following * n : following * n + n] -= np.eye(n)
+            matrix[rows, len(z) - len(self.names) :] = image.columns[i]
+            if not self.periods:
+                matrix[rows, m * n + shifts] = rates[i] / m
+            elif (slope := self._period_slope(values)) != 0.0:
+                matrix[rows, -1] += rates[i] * slope / m
+        residual[m * n - n : m * n] -= self.turns + self.shifts @ z[m * n : m * n + shifts]
+        matrix[m * n - n : m * n, m * n : m * n + shifts] = -self.shifts
+        # The conditions: across the motion, and across each shift at the first state.
+        away = (states - self.states(self.point)) / self.scale
+        for k, direction in enumerate(self.shifts.T):
+            residual[m * n + k] = direction @ away[0]
+            matrix[m * n + k, :n] = direction / self.scale
+        if not self.periods:
+            residual[-1] = float(np.sum(self.phase * away))
+            matrix[-1, : m * n] = (self.phase / self.scale).ravel()
+        return residual, matrix
+
+    def _image(self, z: np.ndarray) -> tuple[Image, np.ndarray]:
+        """Integrate all segments: the images and the rates at their ends; the last call is kept."""
+        key = z.tobytes()
+        if self.last is None or self.last[0] != key:
+            period, m = self.period(z), self.segments
+            if not (math.isfinite(period) and period > 0.0 and np.isfinite(z).all()):
+                raise ArithmeticError(f"a cycle has the period {period:.6g}")
+            values = self.values(z)
+            image = self.flow.linearise(values, self.states(z), np.full(m, period / m), self.scale)
+            if not (np.isfinite(image.states).all() and np.isfinite(image.propagators).all()):
+                raise ArithmeticError("the motion leaves all bounds")
+            self.last = key, image, self.flow.rates(values, image.states)
+        return self.last[1:]
+
+    def noise(self, z: np.ndarray) -> np.ndarray:
+        """Return what the integration leaves: its tolerance times the size of the motion."""
+        states, tail = self.states(z), len(z) - len(self.names) - self.phase.size
+        sizes = NOISE * TOLERANCE * (np.abs(states) + 0.1 * self.scale)
+        return np.concatenate([sizes.ravel(), np.full(tail, TOLERANCE)])
+
+    def accept(self, z: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Make a solution the reference; divide the segments if deviations grow by too much."""
+        image, _ = self._image(z)
+        grown = max(np.linalg.norm(M * self.scale / self.scale[:, None], 2) for M in image.propagators)
+        factor = self._finer() if grown > GROWTH else 1
+        if factor > 1:
+            z, tangent = self._divided(z, tangent, factor)
+        speed = float(np.linalg.norm(self.flow.rates(self.values(z), self.states(z)[:1])[0] / self.scale))
+        if not self.speed / RESCALED < speed < self.speed * RESCALED:
+            self._rescale(z)
+        self._refer(z)
+        return z, tangent / float(np.linalg.norm(self.weights * tangent))
+
+    def _finer(self) -> int:
+        """Return the factor of the next finer division; with a drive a segment has whole periods of the drive."""
+        if not self.periods:
+            return 2 if 2 * self.segments <= MOST_SEGMENTS else 1
+        return next((k for k in range(2, self.periods + 1) if self.periods % (k * self.segments) == 0), 1)
+
+    def _divided(self, z: np.ndarray, tangent: np.ndarray, factor: int) -> tuple[np.ndarray, np.ndarray]:
+        """Divide each segment into `factor`; the tangent at the new states follows the flow."""
+        states, ahead, m = [self.states(z)], [self.states(tangent)], self.segments
+        values, part = self.values(z), self.period(z) / (m * factor)
+        along = self._period_slope(values) * tangent[-1] if self.periods else tangent[-1 - len(self.names)]
+        for _ in range(factor - 1):
+            image = self.flow.linearise(values, states[-1], np.full(m, part), self.scale)
+            rates = self.flow.rates(values, image.states)
+            moved = np.einsum("mij,mj->mi", image.propagators, ahead[-1])
+            moved += image.columns @ tangent[len(z) - len(self.names) :] + rates * along / (m * factor)
+            states.append(image.states)
+            ahead.append(moved)
+        parts = [np.stack(each, axis=1).ravel() for each in (states, ahead)]
+        tail = self.phase.size
+        self.phase = np.zeros((m * factor, self.phase.shape[1]))
+        return np.append(parts[0], z[tail:]), np.append(parts[1], tangent[tail:])
+
+    def _refer(self, z: np.ndarray) -> None:
+        """Make a state the reference of the conditions."""
+        self.point, self.last = z, None if self.last is None or self.last[0] != z.tobytes() else self.last
+        rates = self.flow.rates(self.values(z), self.states(z)) / self.scale
+        size = float(np.linalg.norm(rates))
+        self.phase = rates / size if size > 0.0 else rates
+
+    def orbit_states(self, z: np.ndarray, looks: int = LOOKS) -> np.ndarray:
+        """Return states (m * looks, n) at equal times on the orbit."""
+        states, m = self.states(z), self.segments
+        if looks == 1:
+            return states
+        times = np.arange(looks) * self.period(z) / (m * looks)
+        moved = self.flow.advance(self.values(z), np.repeat(states, looks - 1, axis=0), np.tile(times[1:], m))
+        return np.concatenate([states[:, None], moved.reshape(m, looks - 1, -1)], axis=1).reshape(m * looks, -1)
+
+    def _rescale(self, z: np.ndarray) -> None:
+        """Measure the extents of the motion; a state at rest gets its size, or the largest extent."""
+        states = self.orbit_states(z)
+        extent, size = np.ptp(states, axis=0), np.abs(states).max(axis=0)
+        largest = float(extent.max()) or 1.0
+        still = extent < 1e-9 * np.maximum(size, largest)
+        scale = np.where(still, np.where(size > 0.0, np.minimum(size, largest), largest), extent)
+        # Scales never shrink: a cycle that vanishes does so in a finite number of steps.
+        self.scale = scale if math.isnan(self.speed) else np.maximum(self.scale, scale)
+        self.last = None
+        self.speed = float(np.linalg.norm(self.flow.rates(self.values(z), self.states(z)[:1])[0] / self.scale))
+
+    def _whole_turns(self, states: np.ndarray, period: float) -> np.ndarray:
+        """Return the whole turns of angles by which the motion from the last state differs from the first."""
+        angles = periods_of_states(self.flow.equations)[: self.flow.size]
+        if not any(angles):
+            return np.zeros(self.flow.size)
+        image = self.flow.advance(self.scene.parameters, states[-1:], np.full(1, period / len(states)))[0]
+        gaps = image - states[0]
+        return np.array([0.0 if a is None else a * round(gap / a) for a, gap in zip(angles, gaps, strict=True)])
+
+    def solved(self) -> tuple[np.ndarray, float, int]:
+        """Solve by Newton's method with the parameters fixed: the best point, its largest gap and the number of steps.
+
+        Where the matrix is singular, as of conservative motions, the step of least length is taken.
+        """
+        q, n = len(self.names), self.phase.shape[1]
+        z, best, steps = self.point, math.inf, 0
+        nearest, left, weights = z, math.inf, self.weights[: len(z) - q]
+        sizes = np.append(np.tile(self.scale, self.segments), np.ones(len(weights) - self.phase.size))
+        while steps < MOST_STEPS:
+            try:
+                residual, matrix = self.linearise(z)
+            except ArithmeticError:
+                if math.isinf(left):
+                    raise
+                break  # the last correction led too far away
+            size = float(np.abs(residual / sizes).max())
+            # Stop where the gap no longer falls: it is that of the integration, or Newton's method diverges.
+            if not size < (best if best < NEAR else 10.0 * best):
+                break
+            if size < best:
+                nearest, best, left = z, size, float(np.abs(residual[: self.phase.size]).max())
+            image = self._image(z)[0]
+            if left == 0.0:
+                break
+            if self.flow.equations.sticks and np.array_equal(
+                image.propagators[0], np.diag([1.0, 0.0] if n == 2 else [0.0] * n)
+            ):
+                # The ground carries the body along: follow the motion until the body slips.
+                z, best = np.append(image.states[0], z[n:]), math.inf
+            else:
+                step = (
+                    linalg.lstsq(matrix[:, : len(weights)] / weights / sizes[:, None], -residual / sizes)[0] / weights
+                )
+                z = np.append(z[: len(weights)] + step, z[len(weights) :])
+            steps += 1
+            if not np.linalg.norm(self.weights * (z - self.point)) < ASTRAY:
+                break
+        return nearest, left, steps
+
+    def solution(self, point: Point) -> PeriodicOrbit:
+        """Return the periodic orbit at a solution."""
+        z = point.z
+        critical = self.critical(z) if point.critical is None else point.critical
+        image, rates = self._image(z)
+        values, state = self.values(z), self.states(z)[0]
+        along = critical.blocks < 0
+        neutral = np.ones(self.shifts.shape[1])
+        if not self.periods:
+            # The multiplier of the motion itself, as the integration finds it.
+            moved = rates[-1]
+            for propagator in image.propagators:
+                moved = propagator @ moved
+            scaled = rates[-1] / self.scale
+            neutral = np.append(neutral, scaled @ (moved / self.scale) / (scaled @ scaled))
+        multipliers = np.concatenate([critical.values[along], neutral])
+        gaps = image.states - np.roll(self.states(z), -1, axis=0)
+        gaps[-1] -= self.turns + self.shifts @ z[self.phase.size : self.phase.size + self.shifts.shape[1]]
+        copies = expansion(self.scene.equations, self.classes, len(state))
+        order = np.argsort(critical.blocks[~along], kind="stable")
+        changed = {name: values[name] for name in self.names if values[name] != self.scene.parameters[name]}
+        return PeriodicOrbit(
+            with_numbers(self.scene, changed), self.periods or 1, copies @ state, sorted_by_size(multipliers),
+            float(np.abs(gaps).max()), point.corrections, 0.0 if self.periods else self.period(z), copies @ self.scale, self.classes,
+            critical.values[~along][order], critical.blocks[~along][order],
+            () if self.transversal is None else self.transversal.labels,
+            "synchronous" if len(self.classes) > 1 and len(set(self.classes)) == 1 else "",
+        )  # fmt: skip
+
+    # --- stability ---
+    def critical(self, z: np.ndarray) -> Critical:
+        """Return all multipliers but those of the motion itself and of the shifts."""
+        along = self.multipliers(z)
+        blocks = np.full(len(along), -1)
+        if self.transversal is not None:
+            across, of = self.transversal.multipliers(self.values(z), self.states(z), self.period(z), self.scale)
+            along, blocks = np.concatenate([along, across]), np.concatenate([blocks, of])
+        return Critical.of(np.abs(along) - 1.0, along, blocks)
+
+    def multipliers(self, z: np.ndarray) -> np.ndarray:
+        """Return the multipliers along the quotient, without those of the motion itself and of the shifts."""
+        return product_eigenvalues(self._reduced(z)[0])
+
+    def _reduced(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the propagators without the neutral directions, and the bases (m, n, k) of what is left, in scaled states."""
+        image, rates = self._image(z)
+        neutral = np.repeat(self.shifts[None] / self.scale[:, None], self.segments, axis=0)
+        if not self.periods:
+            here = np.roll(rates, 1, axis=0) / self.scale  # rates at the beginning of each segment
+            neutral = np.concatenate([here[:, :, None], neutral], axis=2)
+        scaled = image.propagators * self.scale / self.scale[:, None]
+        if not neutral.shape[2]:
+            return scaled, np.tile(np.eye(len(self.scale)), (self.segments, 1, 1))
+        bases = np.array([linalg.qr(each)[0][:, each.shape[1] :] for each in neutral])
+        return np.roll(bases, -1, axis=0).transpose(0, 2, 1) @ scaled @ bases, bases
+
+    def vectors(self, z: np.ndarray, value: complex, count: int, block: int = -1) -> np.ndarray:
+        """Return directions (states, count) of the network that a period multiplies by `value`, orthonormal.
+
+        `block` is that of the multiplier in `critical`.
+        """
+        if block >= 0 and self.transversal is not None:
+            return self.transversal.vectors(self.values(z), self.states(z), self.period(z), value, count)
+        matrices, bases = self._reduced(z)
+        small = null_vectors(matrices, value, count)
+        vectors = self.scale[:, None] * (bases[0] @ small)
+        return np.linalg.qr(expansion(self.scene.equations, self.classes, len(self.scale)) @ vectors)[0]
+
+    def birth(self, z: np.ndarray) -> BifurcationKind | None:
+        """Return the bifurcation in which the cycles are born, if a branch point is one; None else."""
+        away = np.abs(self.flow.rates(self.values(z), self.states(z)) / self.scale).max() * self.period(z)
+        if not self.periods and away < BORN:
+            return BifurcationKind.HOPF
+        # After half the time the motion is where it began: a cycle of half the period doubles it here.
+        if self.periods % 2 or (self.segments > 1 and self.segments % 2):
+            return None
+        if self.segments > 1:
+            half = self.states(z)[self.segments // 2]
+        else:
+            half = self.flow.advance(self.values(z), self.states(z), np.full(1, 0.5 * self.period(z)))[0]
+        gap = np.abs(half - self.states(z)[0] - 0.5 * self.turns)
+        return BifurcationKind.PERIOD_DOUBLING if np.all(gap <= BORN * self.scale) else None
+
+    def kind(self, value: complex, turned: bool) -> BifurcationKind:
+        """Name the bifurcation at which a multiplier passes the unit circle."""
+        if abs(value.imag) > REAL * abs(value):
+            return BifurcationKind.TORUS
+        if value.real < 0.0:
+            return BifurcationKind.PERIOD_DOUBLING
+        return BifurcationKind.FOLD if turned else BifurcationKind.BRANCH_POINT
+
+
+def quotient_of(scene: Scene, classes: Sequence[int], names: Sequence[str]) -> Equations:
+    """Return the equations of the clusters: of the whole network, or of a single node if all move alike."""
+    fixed = {name: value for name, value in scene.parameters.items() if name not in names}
+    equations = without_drive(scene.equations, {**dict.fromkeys(names, 1.0), **fixed})
+    if len(set(classes)) == equations.n:
+        return equations
+    if len(set(classes)) == 1:
+        return Equations.of_equal_nodes(synchronous_node(equations), None, 1)
+    return collapse(equations, classes)
+
+
+@lru_cache(maxsize=32)
+def _frequency_slope(equations: Equations, name: str) -> Callable[..., float] | None:
+    """Return the derivative of the logarithm of the drive's frequency by a parameter; None if it does not enter."""
+    frequency, symbol = angular_frequency(equations), sp.Symbol(name, real=True)
+    if frequency is None or not frequency.has(symbol):
+        return None
+    # Frequencies with a common divisor are proportional to each other: the first of them decides.
+    first = frequency.replace(lambda e: e.func.__name__ == "common", lambda e: e.args[0])
+    symbols = [sp.Symbol(each, real=True) for each in equations.parameters]
+    slope: Callable[..., float] = sp.lambdify(symbols, sp.simplify(first.diff(symbol) / first), "numpy")
+    return slope
+
+
+def _classes_of(scene: Scene, rows: np.ndarray) -> tuple[int, ...]:
+    """Return the clusters of nodes whose states agree in all rows (k, states) and that symmetry keeps alike."""
+    equations, alone = scene.equations, tuple(range(scene.n))
+    if scene.n == 1 or equations.mixed or equations.differing:
+        return alone
+    scale = np.abs(rows).max(axis=1, keepdims=True)
+    table = np.round(rows / np.where(scale > 0.0, scale, 1.0), 7).reshape(len(rows), -1, scene.n) + 0.0
+    colours = [tuple(table[:, :, i].ravel().tolist()) for i in range(scene.n)]
+    try:
+        classes = quotient(equations, colours)[1]
+        quotient_of(scene, classes, ())
+    except ValueError:
+        return alone
+    return classes

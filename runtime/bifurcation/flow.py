@@ -1,0 +1,342 @@
+"""The flow of a network over some times, with its exact derivatives by the state and by parameters.
+
+`LiftedFlow` integrates the lifted network (`synchain.models.dynamics.lift`): each lane of the kernel carries the state and
+one deviation, so that the columns of all propagators of all segments are cells of one call.  `ContactFlow` integrates
+set-valued friction with the kernel of modes, which multiplies deviations by saltation matrices at stick and slip.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import NamedTuple, Protocol
+
+import numpy as np
+import sympy as sp
+from scipy.sparse.linalg import spsolve
+
+from synchain.codegen.driver.columns import Control, SpanColumn
+from synchain.codegen.integrators import Integrator
+from synchain.codegen.kernels.observable_functions import Recording
+from synchain.codegen.kernels.sweep_kernel import LARGEST_UNROLLED_LIFT
+from synchain.codegen.machine_code.compile import load
+from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.lift import Lift, lifted
+from synchain.models.dynamics.variational import Variation, network_variation
+from synchain.models.mechanics.components import TIME
+from synchain.models.scenes.scene import Scene
+
+from ..cells.drive_times import longest_steps, periods
+from ..cells.initial_modes import with_modes
+from ..cells.plan import FIRST_STEP, CellRows
+from ..engines.choice import chosen_for_modes, chosen_for_rows
+from ..engines.job import JobSpec, RowsJob, RowsSpec
+from ..engines.step_control import control_array
+from ..stability.motion import OrbitIntegrator, RateFunctions, rates_of
+from ..stability.variational_integrator import VariationalIntegrator
+from ..support.status import Status
+from .linearised import Linearised
+
+TOLERANCE = 1e-12
+"""Relative tolerance of the integration (a choice)."""
+
+LEAST = 1e-3
+"""The absolute tolerance is TOLERANCE times LEAST times the scale of the component with the least scale (a choice)."""
+
+
+STICKS = 10.0
+"""A sliding velocity below this many integration errors is zero (a choice)."""
+
+
+class Image(NamedTuple):
+    """The state after a time, and its derivatives, segment by segment."""
+
+    states: np.ndarray  # (m, n)
+    propagators: np.ndarray  # (m, n, n): derivative by the state at the beginning
+    columns: np.ndarray  # (m, n, q): derivative by each parameter at equal time
+
+
+class Flow(Protocol):
+    """The flow of some equations; a state has `size` numbers, without slip states."""
+
+    equations: Equations
+
+    size: int
+    steps: float  # mean length of a step of the last call
+
+    def rates(self, values: Mapping[str, float], states: np.ndarray) -> np.ndarray:
+        """Return the rates (m, n) at the beginning of a period of the drive."""
+
+    def motion(self, values: Mapping[str, float], state: np.ndarray) -> tuple[OrbitIntegrator, RateFunctions]:
+        """Return the motion from a state, step by step, and the functions of its states that `motion.path` needs."""
+
+    def advance(self, values: Mapping[str, float], states: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Return the states (m, n) after the times (m,), from states (m, n) at the beginning of a period of the drive."""
+
+    def linearise(self, values: Mapping[str, float], states: np.ndarray, times: np.ndarray, scale: np.ndarray) -> Image:
+        """Return the states after the times with their derivatives; `scale` (n,) is the size of a deviation."""
+
+
+def flow_of(scene: Scene, equations: Equations, names: Sequence[str], state: np.ndarray) -> Flow:
+    """Return the flow of equations that belong to a scene, with its derivatives by some parameters.
+
+    The kernel is chosen by the motion at a state (n,).
+    """
+    present = tuple(name for name in names if name in equations.parameters)
+    if equations.sticks:
+        return ContactFlow(scene, equations, present, tuple(names), equations.n * 2)
+    lift, job = _job(scene.replace(rtol=TOLERANCE, atol=None), equations, present, tuple(map(float, state)))
+    return LiftedFlow(equations, lift, job, present, tuple(names), equations.dimension, _linearised(equations))
+
+
+@dataclass(slots=True)
+class LiftedFlow:
+    """The flow of a network with smooth rates."""
+
+    equations: Equations
+    lift: Lift
+    job: RowsJob
+    present: tuple[str, ...]  # the parameters among `names` that the equations contain
+    names: tuple[str, ...]
+    size: int
+    network: Linearised  # the equations at the beginning of a period of the drive
+    steps: float = math.nan
+
+    def rates(self, values: Mapping[str, float], states: np.ndarray) -> np.ndarray:
+        """Evaluate the templates, and solve with the mass matrix if there is one."""
+        network = self.network.at(values)
+        rates = [network.rates(state) for state in states]
+        masses = [network.mass(state) for state in states]
+        return np.array([r if m is None else spsolve(m, r) for r, m in zip(rates, masses, strict=True)])
+
+    def motion(self, values: Mapping[str, float], state: np.ndarray) -> tuple[OrbitIntegrator, RateFunctions]:
+        """Return the motion from a state, and its rates."""
+        network = self.network.at(values)
+
+        def sizes(x: np.ndarray) -> np.ndarray:
+            terms, mass = network.term_sizes(x), network.mass(x)
+            return terms if mass is None else np.abs(spsolve(mass, terms))
+
+        return Walker(self, values, state), RateFunctions(lambda x: self.rates(values, x[None])[0], sizes)
+
+    def advance(self, values: Mapping[str, float], states: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Integrate the states without deviations."""
+        return self._run(
+            values, states, np.zeros_like(states), np.zeros((len(states), len(self.present))), times, np.abs(states)
+        )[0]
+
+    def linearise(self, values: Mapping[str, float], states: np.ndarray, times: np.ndarray, scale: np.ndarray) -> Image:
+        """Integrate a lane for each column of each propagator, and one for each parameter."""
+        (m, n), q = states.shape, len(self.present)
+        # A deviation of the size of the motion, so that all tolerances are relative to the same scale.
+        deviations = np.tile(np.vstack([np.diag(scale), np.zeros((q, n))]), (m, 1))
+        sizes = np.array([abs(values[name]) or 1.0 for name in self.present])
+        seeds = np.tile(np.vstack([np.zeros((n, q)), np.diag(sizes)]), (m, 1))
+        both = self._run(values, np.repeat(states, n + q, axis=0), deviations, seeds, np.repeat(times, n + q), scale)
+        images, moved = (part.reshape(m, n + q, n) for part in both)
+        matrices = (moved / np.append(scale, sizes)[:, None]).transpose(0, 2, 1)
+        columns = np.zeros((m, n, len(self.names)))
+        columns[:, :, [self.names.index(name) for name in self.present]] = matrices[:, :, n:]
+        return Image(images[:, 0], matrices[:, :, :n], columns)
+
+    def _run(
+        self,
+        values: Mapping[str, float],
+        states: np.ndarray,
+        deviations: np.ndarray,
+        seeds: np.ndarray,
+        times: np.ndarray,
+        scale: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Integrate rows of states, deviations and seeds; return the states and the deviations."""
+        rows = _rows(self.lift, values, self.present, states, deviations, seeds, times)
+        self.job.control[Control.ATOL] = LEAST * TOLERANCE * float(scale[scale > 0.0].min(initial=1.0))
+        buffers = self.job.run(rows)
+        failed = buffers.status != Status.FINISHED
+        if failed.any():
+            status = Status(int(buffers.status[failed.argmax()]))
+            raise FloatingPointError(f"the motion cannot be integrated: {status.message}")
+        self.steps = float(times.sum() / max(1, int(buffers.steps.sum())))
+        return buffers.end[:, self.lift.states], buffers.end[:, self.lift.deviations]
+
+
+class Walker:
+    """One motion of a lifted network that advances step by step."""
+
+    def __init__(self, flow: LiftedFlow, values: Mapping[str, float], state: np.ndarray) -> None:
+        self.flow, self.values, self.state, self.steps = flow, values, state[None], 0
+        self.control = flow.job.control
+
+    def advance(self, length: float) -> None:
+        """Integrate over a length of time."""
+        self.state = self.flow.advance(self.values, self.state, np.full(1, length))
+        self.steps += max(1, round(length / self.flow.steps))
+
+
+def _rows(
+    lift: Lift,
+    values: Mapping[str, float],
+    names: Sequence[str],
+    states: np.ndarray,
+    deviations: np.ndarray,
+    seeds: np.ndarray,
+    times: np.ndarray,
+) -> CellRows:
+    """Lay out rows of a lifted network. Shapes: states, deviations (k, n), seeds (k, q), times (k,)."""
+    equations = lift.equations
+    start = np.empty((len(states), equations.dimension))
+    start[:, lift.states], start[:, lift.deviations] = states, deviations
+    numbers = np.tile([float(values.get(name, 0.0)) for name in equations.parameters], (len(states), 1))
+    for name, column in zip(names, seeds.T, strict=True):
+        numbers[:, equations.parameters.index(lift.seeds[name])] = column
+    spans = np.zeros((len(states), len(SpanColumn)))
+    spans[:, SpanColumn.END], spans[:, SpanColumn.FIRST_STEP] = times, FIRST_STEP * times
+    spans[:, SpanColumn.LOOK], spans[:, SpanColumn.LONGEST] = math.inf, math.inf
+    if equations.forced:
+        spans[:, SpanColumn.PERIOD] = periods(equations, numbers[:1])
+        spans[:, SpanColumn.LONGEST] = longest_steps(equations, numbers[:1], times.max(keepdims=True))
+    return CellRows(start, numbers, spans)
+
+
+@lru_cache(maxsize=32)
+def _linearised(equations: Equations) -> Linearised:
+    """Compile the rates at time 0; `at` gives the numbers of the parameters."""
+
+    def start(e: sp.Expr) -> sp.Expr:
+        return e.xreplace({TIME: sp.S.Zero})
+
+    still = equations.map_templates(lambda node: node.map(start), lambda edge: edge.map(start))
+    return Linearised.of(still, dict.fromkeys(still.parameters, 1.0))
+
+
+@lru_cache(maxsize=32)
+def _lift(equations: Equations, names: tuple[str, ...]) -> Lift:
+    return lifted(equations, names)
+
+
+def _job(scene: Scene, equations: Equations, names: tuple[str, ...], state: tuple[float, ...]) -> tuple[Lift, RowsJob]:
+    """Return a lift and the job that integrates it, with the integrator for the motion from a state."""
+    lift, size = _lift(equations, names), len(state)
+    rows = _rows(
+        lift, scene.parameters, names, np.array([state]), np.ones((1, size)), np.zeros((1, len(names))), np.ones(1)
+    )
+    return lift, _compiled(lift.equations, chosen_for_rows(scene, lift.equations, rows), scene.max_steps)
+
+
+@lru_cache(maxsize=32)
+def _compiled(equations: Equations, method: Integrator, max_steps: int) -> RowsJob:
+    """Return the job of a lifted network."""
+    control = control_array(TOLERANCE, LEAST * TOLERANCE, math.inf, max_steps, jumps=False)
+    spec = RowsSpec(equations, method, control, Recording(()), LARGEST_UNROLLED_LIFT)
+    source = spec.source()
+    return spec.job(JobSpec.of(spec, source), load(source))
+
+
+@dataclass(slots=True)
+class ContactFlow:
+    """The flow of a network with set-valued friction; the slip states follow from the velocities and the loads."""
+
+    scene: Scene
+    equations: Equations
+    present: tuple[str, ...]  # the parameters among `names` that the equations contain
+    names: tuple[str, ...]
+    size: int
+    steps: float = math.nan
+    method: Integrator | None = field(default=None, repr=False)
+
+    def rates(self, values: Mapping[str, float], states: np.ndarray) -> np.ndarray:
+        """Evaluate the rates with the slip states that belong to the states."""
+        rates = self._functions(values)
+        return np.array([rates.values(state)[: self.size] for state in self._with_slips(values, states)])
+
+    def motion(self, values: Mapping[str, float], state: np.ndarray) -> tuple[OrbitIntegrator, RateFunctions]:
+        """Return the motion from a state with its slip states, which belong to the states of the motion."""
+        full = self._with_slips(values, state[None]) if len(state) == self.size else state[None]
+        integrator = self._integrator(values, full)
+        integrator.control[Control.ATOL] = LEAST * TOLERANCE
+        return integrator, self._functions(values)
+
+    def _integrator(self, values: Mapping[str, float], states: np.ndarray) -> VariationalIntegrator:
+        """Return an integrator from states with slip states, with all deviations."""
+        variation, none = _contact_variation(self.equations, self.present), np.zeros((0, self.size + len(self.present)))
+        numbers = np.tile([values[name] for name in self.equations.parameters], (len(states), 1))
+        if self.method is None:
+            self.method = chosen_for_modes(self.scene, variation, states, numbers, none)
+        integrator = VariationalIntegrator.make(self.scene, variation, states, numbers, none, 1, method=self.method)
+        integrator.observes = True  # single periods are too short for a warning of short steps
+        if any(p in self.present for p in _of_drive(self.equations)):
+            integrator.period = np.zeros(len(states))  # the derivative by the frequency of a drive grows with time
+        integrator.control[Control.RTOL] = TOLERANCE
+        return integrator
+
+    def _functions(self, values: Mapping[str, float]) -> RateFunctions:
+        return _contact_rates(self.equations, tuple(values[name] for name in self.equations.parameters))
+
+    def _with_slips(self, values: Mapping[str, float], states: np.ndarray) -> np.ndarray:
+        """Return states with slip states; a velocity that differs from the ground's by rounding is the ground's."""
+        n = self.equations.n
+        numbers = np.tile([values[name] for name in self.equations.parameters], (len(states), 1))
+        states, grounds = states.copy(), _grounds(self.equations)(*numbers[0])
+        velocities = states[:, n:]
+        speeds = np.maximum(np.abs(velocities).max(axis=0), np.abs(grounds))
+        near = np.abs(velocities - grounds) <= STICKS * TOLERANCE * (speeds + np.abs(states[:, :n]).max(axis=0))
+        velocities[near] = np.broadcast_to(grounds, velocities.shape)[near]
+        return with_modes(self.equations, np.hstack([states, np.zeros((len(states), n))]), numbers)
+
+    def advance(self, values: Mapping[str, float], states: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Integrate the states; the deviations come along."""
+        return self.linearise(values, states, times, np.ones(self.size)).states
+
+    def linearise(self, values: Mapping[str, float], states: np.ndarray, times: np.ndarray, scale: np.ndarray) -> Image:
+        """Integrate each segment with all its deviations."""
+        (m, n), q = states.shape, len(self.present)
+        integrator = self._integrator(values, self._with_slips(values, states))
+        grounds = _ground_slopes(self.equations, self.present)(*integrator.parameter_values[0])
+        columns = np.eye(n + q)
+        columns[n // 2 : n, n:] -= grounds  # velocities relative to the ground
+        integrator.control[Control.ATOL] = LEAST * TOLERANCE * float(scale[scale > 0.0].min(initial=1.0))
+        lengths = np.linalg.norm(columns, axis=0)
+        integrator.set_deviations(np.tile(columns / lengths, (m, 1, 1)))
+        growth = integrator.advance(times)
+        with np.errstate(all="ignore"):  # over a long transient deviations leave the range of numbers
+            matrices = integrator.deviations * (np.exp(growth) * lengths)[:, None, :]
+        matrices[:, n // 2 : n, n:] += grounds
+        self.steps = float(times.sum() / max(1, integrator.steps))
+        moved = np.zeros((m, n, len(self.names)))
+        moved[:, :, [self.names.index(name) for name in self.present]] = matrices[:, :n, n:]
+        return Image(integrator.state[:, :n], matrices[:, :n, :n], moved)
+
+
+@lru_cache(maxsize=32)
+def _contact_variation(equations: Equations, names: tuple[str, ...]) -> Variation:
+    return network_variation(equations, names)
+
+
+@lru_cache(maxsize=32)
+def _contact_rates(equations: Equations, numbers: tuple[float, ...]) -> RateFunctions:
+    return rates_of(equations, dict(zip(equations.parameters, numbers, strict=True)))
+
+
+@lru_cache(maxsize=32)
+def _grounds(equations: Equations) -> Callable[..., np.ndarray]:
+    """Return the velocities (n,) of the grounds as a function of all parameters."""
+    targets = [event.target for i in range(equations.n) for event in equations.events_at(i)]
+    function = sp.lambdify([sp.Symbol(p, real=True) for p in equations.parameters], targets, "numpy")
+    return lambda *values: np.array(function(*values), dtype=float)
+
+
+@lru_cache(maxsize=32)
+def _ground_slopes(equations: Equations, names: tuple[str, ...]) -> Callable[..., np.ndarray]:
+    """Return the derivatives (n, q) of the velocities of the grounds by some parameters, as a function of all parameters."""
+    targets = [event.target for i in range(equations.n) for event in equations.events_at(i)]
+    slopes = [[target.diff(sp.Symbol(name, real=True)) for name in names] for target in targets]
+    function = sp.lambdify([sp.Symbol(p, real=True) for p in equations.parameters], slopes, "numpy")
+    return lambda *values: np.array(function(*values), dtype=float).reshape(len(targets), len(names))
+
+
+def _of_drive(equations: Equations) -> set[str]:
+    """Return the names of the parameters in the frequency of the drive."""
+    waves = (part for e in equations.node.rhs for part in e.atoms(sp.Function) if part.has(TIME))
+    return {s.name for part in waves for s in part.free_symbols}

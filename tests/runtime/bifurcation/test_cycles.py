@@ -1,0 +1,211 @@
+"""Cycles of networks and their branches, against closed forms (C) and independent code (F: Fourier collocation).
+
+The values of (F) were computed with SciPy's DOP853 at 2.5e-14 and variational equations, and checked by collocation.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import synchain as sc
+from synchain.runtime.bifurcation.cycles import Cycles
+from synchain.runtime.bifurcation.flow import flow_of
+from synchain.runtime.bifurcation.products import product_eigenvalues
+
+K, KAP, B, DX, DY, A = sp.symbols("k kap b Dx Dy a")
+VAN_DER_POL = sc.Field({"x": "v", "v": "(1 - x**2)*v - x"})
+i, j, W = sc.ends(VAN_DER_POL)
+PUSH = sc.Rates({i.v: -K * W * (j.v - i.v)}, {K: 0.3})
+
+
+def pair(**more: object) -> sc.Scene:
+    return sc.Scene(
+        VAN_DER_POL, PUSH, sc.graphs.chain(2), **{"initial": {"x": 2.0, "v": 0.0}, "transient": 50.0, **more}
+    )
+
+
+@cache
+def ring_of_brusselators() -> sc.Scene:
+    node = sc.Field({"x": "2 - (B + 1)*x + x**2*y", "y": "B*x - x**2*y"}, parameters={"B": 5.5})
+    i, j, W = sc.ends(node)
+    link = sc.Rates({i.x: DX * W * (j.x - i.x), i.y: DY * W * (j.y - i.y)}, {DX: 0.1, DY: 1})
+    return sc.Scene(node, link, sc.graphs.ring(6), initial={"x": 2, "y": 1}, transient=50)
+
+
+@cache
+def repressilator(a: float) -> sc.Scene:
+    node = sc.Field({"m": "-m", "p": "-5*(p - m)"})
+    i, j, W = sc.ends(node)
+    graph = sc.graphs.from_edges([(1, 2), (2, 3), (3, 1)], directed=True)
+    link = sc.Rates({i.m: A * W / (1 + j.p**2)}, {A: a})
+    return sc.Scene(node, link, graph, initial={"m": [1, 2, 3], "p": [1, 2, 4]}, transient=50)
+
+
+def wave(n: int, q: int, kap: float, b: float) -> tuple[sc.Scene, float]:
+    """A travelling wave of Stuart-Landau oscillators and its period (C)."""
+    node = sc.Field({"x": "x - y - (x**2 + y**2)*(x - y/2)", "y": "y + x - (x**2 + y**2)*(y + x/2)"})
+    i, j, W = sc.ends(node)
+    rates = {i.x: KAP * W * (j.x - i.x - B * (j.y - i.y)), i.y: KAP * W * (j.y - i.y + B * (j.x - i.x))}
+    slope = 2 - 2 * math.cos(2 * math.pi * q / n)
+    radius = math.sqrt(1 - kap * slope)
+    angles = 2 * np.pi * q * np.arange(n) / n
+    start = {"x": list(radius * np.cos(angles)), "y": list(radius * np.sin(angles))}
+    period = 2 * math.pi / (1 - radius**2 / 2 - kap * b * slope)
+    return sc.Scene(node, sc.Rates(rates, {KAP: kap, B: b}), sc.graphs.ring(n), initial=start), period
+
+
+def stick_slip(sigma: float) -> sc.Scene:
+    """Blocks on a belt of speed 0.1, friction 0.4 in slip and 0.6 at rest."""
+    numbers = {"nu": 0.1, "mu_k": 0.4, "mu_s": 0.6, "sigma": sigma}
+    more = {"friction": "coulomb_static", "contact": "set-valued", "parameters": numbers}
+    return sc.Scene("spring_block", "spring", sc.graphs.chain(2), initial={"x": 0.0, "v": 0.1}, transient=5, **more)
+
+
+# --- orbits ---
+def test_a_pair_is_described_by_how_it_moves() -> None:
+    """In phase it is unstable across, in antiphase stable (F)."""
+    together = sc.periodic_orbit(pair())
+    assert together.period == pytest.approx(6.66328685932313, abs=1e-12)
+    assert together.across[0].real == pytest.approx(5.92024491731, abs=1e-10)
+    assert together.verdict == ("synchronous; along itself stable; across it unstable in 1 of 1 modes, largest 5.92024")
+    assert not together.stable
+    apart = sc.periodic_orbit(pair(initial={"x": [2.0, -1.0], "v": 0.0}))
+    assert apart.period == pytest.approx(7.196573966960774, abs=1e-12)
+    assert apart.multipliers[1].real == pytest.approx(0.157520224585, abs=1e-11)
+    assert apart.verdict == "antiphase: node 2 half a period after node 1; stable, by the multipliers of all 2 nodes"
+    assert apart.stable
+    weak = sc.periodic_orbit(pair(initial={"x": [2.0, -1.0], "v": 0.0}), k=0.1)
+    assert weak.period == pytest.approx(6.82122966782178, abs=1e-12)
+    assert weak.multipliers[1].real == pytest.approx(0.553358926690, abs=1e-11)
+    assert sc.periodic_orbit(pair(), k=0.1).across[0].real == pytest.approx(1.80183988068, abs=1e-10)
+
+
+def test_newtons_method_alone_finds_an_unstable_orbit_of_the_whole_network() -> None:
+    orbit = sc.periodic_orbit(pair(), start=[2.0, 2.000001, 0.0, 0.0], period=6.7)
+    assert orbit.classes == (0, 1)
+    assert orbit.multipliers[0].real == pytest.approx(5.92024491731, abs=1e-9)
+    assert orbit.verdict == "synchronous; unstable, by the multipliers of all 2 nodes"
+
+
+def test_a_lone_oscillator_is_not_its_network() -> None:
+    orbit = sc.periodic_orbit(pair().lone)
+    assert orbit.verdict == "one oscillator: stable"
+    assert orbit.stable
+
+
+def test_three_genes_travel() -> None:
+    """Each protein is that of the one before it, a third of a period later (F)."""
+    orbit = sc.periodic_orbit(repressilator(200.0))
+    assert orbit.period == pytest.approx(9.440954865983308, abs=1e-11)
+    assert orbit.multipliers[1].real == pytest.approx(0.11661576173674, abs=1e-12)
+    assert orbit.pattern == "travelling wave: each node moves as the one before it, 1/3 of a period earlier"
+
+
+def test_the_modes_of_synchronous_brusselators() -> None:
+    """(F) for one node, and the whole network as a network."""
+    orbit = sc.periodic_orbit(ring_of_brusselators())
+    assert orbit.period == pytest.approx(3.98285101658994, abs=1e-12)
+    assert orbit.multipliers[1].real == pytest.approx(0.01324088246646, abs=1e-12)
+    assert orbit.modes == ("eigenvalue -1", "eigenvalue -3", "eigenvalue -4")
+    by_mode = [orbit.across[orbit.blocks == k] for k in range(3)]
+    np.testing.assert_allclose(
+        [np.abs(m).max() for m in by_mode], [1.98279774621, 134.568200859, 253.141390338], rtol=4e-12
+    )
+    np.testing.assert_allclose(
+        [m[np.abs(m).argmin()].real for m in by_mode], [-8.35478e-5, 1.928e-10, 1.28e-12], rtol=1e-5, atol=2e-13
+    )
+    assert "across it unstable in 5 of 5 modes, largest 253.141" in orbit.verdict
+    scene = orbit.scene
+    equations = scene.equations
+    flow = flow_of(scene, equations, (), orbit.state)
+    image = flow.linearise(scene.parameters, orbit.state[None], np.full(1, orbit.period), np.abs(orbit.state))
+    whole = np.sort_complex(np.linalg.eigvals(image.propagators[0]))
+    blocks = np.sort_complex(np.concatenate([orbit.multipliers, orbit.across]))
+    np.testing.assert_allclose(whole, blocks, atol=1e-9)
+
+
+def test_clusters_are_checked_and_followed_on_their_quotient() -> None:
+    scene = sc.Scene(VAN_DER_POL, PUSH, sc.graphs.ring(4), initial={"x": [2, -2, 2, -2], "v": 0}, transient=50)
+    orbit = sc.periodic_orbit(scene)
+    assert orbit.classes == (0, 1, 0, 1)
+    assert len(orbit.multipliers) == 4
+    again = sc.periodic_orbit(scene, clusters=[5, 1, 5, 1])
+    np.testing.assert_allclose(again.period, orbit.period, rtol=1e-12)
+    # Alone the quotient is a pair of doubled strength.
+    two = sc.periodic_orbit(pair(initial={"x": [2, -2], "v": 0}), k=0.6)
+    assert orbit.period == pytest.approx(two.period, abs=1e-12)
+    whole = sc.periodic_orbit(scene, start=orbit.state + 1e-7 * np.arange(8), period=orbit.period)
+    ours = np.sort(np.abs(np.concatenate([orbit.multipliers, orbit.across])))
+    np.testing.assert_allclose(np.sort(np.abs(whole.multipliers)), ours, atol=1e-10)
+    with pytest.raises(ValueError, match="expected a balanced partition"):
+        sc.periodic_orbit(scene, clusters=[0, 1, 2, 2])
+
+
+@pytest.mark.parametrize(
+    ("sigma", "multiplier"),
+    [(0.3, 2.715726559203133), (1.0, -1.675514165536), (0.692280105026, 1.0), (0.921158234357, -1.0)],
+)
+def test_stick_and_slip_without_a_drive(sigma: float, multiplier: float) -> None:
+    """T = pi + 2 atan(v/a) + 2 a/v; across mu = cos(w t) - (a w/v) sin(w t), w = sqrt(1 + 2 sigma) (C)."""
+    v, a = 0.1, 0.2
+    slip, w = math.pi + 2 * math.atan(v / a), math.sqrt(1 + 2 * sigma)
+    orbit = sc.periodic_orbit(stick_slip(sigma))
+    assert orbit.period == pytest.approx(slip + 2 * a / v, abs=1e-11)
+    assert orbit.across[0].real == pytest.approx(math.cos(w * slip) - a * w / v * math.sin(w * slip), abs=1e-11)
+    assert orbit.across[0].real == pytest.approx(multiplier, abs=1e-10)
+    np.testing.assert_allclose(orbit.multipliers, [1.0, 0.0], atol=1e-11)
+    if abs(multiplier) != 1.0:
+        assert orbit.stable == (0.692280105026 < sigma < 0.921158234357)
+
+
+@pytest.mark.parametrize("name", ["nu", "mu_k", "mu_s", "sigma"])
+def test_the_derivative_by_a_parameter_passes_stick_and_slip(name: str) -> None:
+    """Guards and grounds depend on parameters: against central differences of the flow itself."""
+    scene = stick_slip(0.3)
+    state, time = np.array([[-0.35, -0.3, 0.05, 0.07]]), np.full(1, 12.0)
+    flow = flow_of(scene, scene.equations, (name,), state[0])
+    image = flow.linearise(scene.parameters, state, time, np.ones(4))
+    h = 1e-6
+    ahead, behind = (flow.advance({**scene.parameters, name: scene.parameters[name] + e}, state, time) for e in (h, -h))
+    np.testing.assert_allclose(image.columns[0, :, 0], (ahead - behind)[0] / (2 * h), atol=2e-8)
+    assert np.abs(image.columns).max() > 1e-3
+
+
+# --- the problem ---
+@pytest.mark.parametrize("segments", [1, 3])
+def test_the_derivatives_of_the_problem_are_those_of_its_residual(segments: int) -> None:
+    orbit = sc.periodic_orbit(pair(initial={"x": [2.0, -1.0], "v": 0.0}))
+    first = Cycles.of(orbit, "k")
+    states = first.orbit_states(first.point, segments)
+    problem = Cycles.near(orbit.scene, ("k",), orbit.classes, states, orbit.period, 0)
+    z = problem.point + 1e-3 * np.random.default_rng(0).normal(size=len(problem.point))
+    matrix = problem.linearise(z)[1]
+    steps = 1e-6 * np.eye(len(z))
+    differences = [(problem.linearise(z + e)[0] - problem.linearise(z - e)[0]) / 2e-6 for e in steps]
+    np.testing.assert_allclose(matrix, np.array(differences).T, atol=1e-7)
+
+
+def test_the_period_of_a_drive_moves_with_its_frequency() -> None:
+    node = sc.Field({"x": "v", "v": "-x - x**3 - v/10 + 0.3*cos(w*t)"}, parameters={"w": 1.2})
+    scene = sc.Scene(node, initial={"x": 0.5, "v": 0.0})
+    problem = Cycles.near(scene, ("w",), (0,), np.array([[0.4, 0.1]]), 4 * math.pi / 1.2, 2)
+    z = problem.point
+    matrix, h = problem.linearise(z)[1], np.array([0.0, 0.0, 1e-6])
+    difference = (problem.linearise(z + h)[0] - problem.linearise(z - h)[0]) / 2e-6
+    np.testing.assert_allclose(matrix[:, -1], difference, atol=1e-8)
+
+
+def test_small_multipliers_of_many_segments() -> None:
+    """The product of matrices with eigenvalues 1e8 and 1e-8 each, five times."""
+    rng = np.random.default_rng(3)
+    bases = [rng.normal(size=(3, 3)) for _ in range(5)]
+    numbers = np.array([[1e4, -2.0, 1e-4], [1e3, 1.0, 1e-4], [1e4, 0.5, 1e-3], [1e2, 1.0, 1e-4], [1e4, 1.0, 1e-4]])
+    cycle = zip(bases[1:] + bases[:1], numbers, bases, strict=True)
+    matrices = np.array([left @ np.diag(each) @ np.linalg.inv(right) for left, each, right in cycle])
+    found = np.sort(product_eigenvalues(matrices).real)
+    np.testing.assert_allclose(found, np.sort(numbers.prod(axis=0)), rtol=1e-6)
