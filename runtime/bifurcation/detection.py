@@ -37,8 +37,9 @@ TOUCHING = 1e-5
 """Largest growth of the value that touches zero at a turn, relative to the largest value (a choice): it grows as the
 square of the distance, which is located to half of the digits."""
 
-BESIDE = 0.03
-"""Distance from a turn, relative to the step, at which the value that passes or touches zero is compared (a choice)."""
+BESIDE, CLEAR = (1e-3, 5e-3, 0.025), 1e-7
+"""Distance from a turn, relative to the step, at which the value that passes or touches zero is compared: the
+first at which it differs from zero by CLEAR, relative to the largest value (choices)."""
 
 NODES = 9
 """Solutions of a step from which its turning point at a branch point is computed (a choice)."""
@@ -139,7 +140,10 @@ def bifurcations(problem: Problem, before: Point, after: Point, length: float) -
         near = [h for h, each in located if abs(h - turn) < TOGETHER * length and not abs(each.critical.imag) > 0.0]
         if not near:
             # Of few eigenvalues of a large network one may pass although the number of growing ones stays the same.
-            sides = [_nearest(step.at(min(max(turn + d * length, 0.0), length))) for d in (-BESIDE, BESIDE)]
+            for beside in BESIDE:
+                sides = [_nearest(step.at(min(max(turn + d * length, 0.0), length))) for d in (-beside, beside)]
+                if min(map(abs, sides)) > CLEAR * critical.scale:
+                    break
             kind = problem.kind(complex(critical.values[touching].real), sides[0] * sides[1] < 0.0)
             fold = kind is BifurcationKind.FOLD
             located.append((turn, Located(kind, step.at(turn) if fold else step.turning_point(turn), touching)))
