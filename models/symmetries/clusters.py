@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Mapping, Sequence, Set
 from dataclasses import dataclass
+from functools import lru_cache
 
 from flint import fmpq, fmpq_mat
 
@@ -64,10 +65,8 @@ class Clusters:
     ----------
     classes : tuple of int
         The cluster of each node; clusters are numbered by their first nodes.
-    quotients : tuple of Topology
-        For each layer the graph whose nodes are the clusters.
-    blocks : tuple of Block
-        The differences within clusters, in the finest blocks.
+    graphs : tuple of Topology
+        The graph of each layer.
 
     See Also
     --------
@@ -84,14 +83,27 @@ class Clusters:
     """
 
     classes: tuple[int, ...]
-    quotients: tuple[Topology, ...]
-    blocks: tuple[Block, ...]
+    graphs: tuple[Topology, ...]
+
+    def __post_init__(self) -> None:
+        _ = self.quotients  # ValueError for a partition that is not balanced
+
+    @property
+    def quotients(self) -> tuple[Topology, ...]:
+        """For each layer the graph whose nodes are the clusters."""
+        count, classes = max(self.classes) + 1, self.classes
+        links = (class_links(graph.n, graph.links, classes) for graph in self.graphs)
+        return tuple(Topology(f"{g.name} quotient", count, own) for g, own in zip(self.graphs, links, strict=True))
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """The differences within clusters, in the finest blocks; computed on first use."""
+        return _blocks(self.graphs, self.classes)
 
     @property
     def members(self) -> tuple[tuple[int, ...], ...]:
         """The nodes of each cluster, ascending."""
-        count = self.quotients[0].n
-        return tuple(tuple(i for i, k in enumerate(self.classes) if k == c) for c in range(count))
+        return tuple(tuple(i for i, k in enumerate(self.classes) if k == c) for c in range(max(self.classes) + 1))
 
 
 def orbital_partitions(
@@ -156,7 +168,7 @@ def orbital_partitions(
                 f"{first.name}({first.n}) has more than {partition_limit} orbital partitions; describe single ones with "
                 "`clusters`"
             )
-    return tuple(_described(graphs, partition) for partition in sorted(closed, key=_fine_first))
+    return tuple(Clusters(partition, graphs) for partition in sorted(closed, key=_fine_first))
 
 
 def clusters(graph: Graphs, classes: Sequence[int]) -> Clusters:
@@ -201,7 +213,7 @@ def clusters(graph: Graphs, classes: Sequence[int]) -> Clusters:
         raise TypeError(f"partition: found {typed_repr(classes)}; expected the cluster of each node, e.g. [0, 0, 1]")
     if len(classes) != n:
         raise ValueError(f"partition: found {len(classes)} classes for {n} nodes; expected one for each node")
-    return _described(graphs, numbered(classes))
+    return Clusters(numbered(classes), graphs)
 
 
 def _layers(what: str, value: object) -> tuple[Topology, ...]:
@@ -215,15 +227,7 @@ def _layers(what: str, value: object) -> tuple[Topology, ...]:
     return graphs
 
 
-def _described(graphs: tuple[Topology, ...], classes: tuple[int, ...]) -> Clusters:
-    """Compute quotients and blocks of a partition that is balanced in every layer."""
-    count = max(classes) + 1
-    quotients = tuple(
-        Topology(f"{graph.name} quotient", count, class_links(graph.n, graph.links, classes)) for graph in graphs
-    )
-    return Clusters(classes, quotients, _blocks(graphs, classes))
-
-
+@lru_cache(maxsize=256)
 def _blocks(graphs: tuple[Topology, ...], classes: tuple[int, ...]) -> tuple[Block, ...]:
     """Separate the differences within clusters into the finest blocks."""
     # Coordinates y_k = x_i minus the mean of the cluster of i, for all nodes i but the first of each cluster.  These

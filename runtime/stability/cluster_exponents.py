@@ -290,7 +290,7 @@ def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
     classes = state.classes if isinstance(state, Clusters) else state
     graphs = [graph for _, graph in scene.model.linked] or [scene.topology]
     partition = clusters(graphs, classes)
-    if isinstance(state, Clusters) and state != partition:
+    if isinstance(state, Clusters) and [graph.links for graph in state.graphs] != [graph.links for graph in graphs]:
         names = " and ".join(f"{graph.name}({graph.n})" for graph in graphs)
         raise ValueError(
             f"cluster state {classes} belongs to another graph than {names}; make it with clusters(graph, classes), or "
