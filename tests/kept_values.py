@@ -15,7 +15,7 @@ from synchain.runtime.bifurcation.equilibrium import Equilibrium
 from synchain.runtime.bifurcation.kinds import BifurcationKind
 from synchain.runtime.bifurcation.periodic_result import PeriodicOrbit
 from synchain.runtime.bifurcation.phases import Phases
-from synchain.runtime.bifurcation.results import Bifurcation, Branch
+from synchain.runtime.bifurcation.results import Bifurcation, Branch, Curve, CurvePoint, Diagram
 from synchain.runtime.bifurcation.skeleton import Skeleton
 from synchain.runtime.results.labelled import Labelled
 from synchain.runtime.stability.attractor import Attractor, Motion
@@ -52,12 +52,33 @@ def orbit_at(omega: float) -> PeriodicOrbit:
     )
 
 
+def at_rest() -> Equilibrium:
+    """An equilibrium with a shift and complex eigenvalues."""
+    return Equilibrium(
+        ROTORS, np.array([0.1, -0.1]), np.array([0.0, -1.5 + 0.5j]), ("theta",), np.array([0.25]), 1e-16, 4
+    )
+
+
 def branch() -> Branch:
     """A branch of three orbits with a bifurcation and phases."""
     omegas = np.array([1.1, 1.2, 1.3])
     turn = Bifurcation(1.25, BifurcationKind.GRAZING, 1e-9, orbit_at(1.25))
     phases = tuple(Phases((0, 1), gap, np.inf) for gap in (0.1, 0.2, 0.3))
     return Branch("omega", omegas, tuple(orbit_at(x) for x in omegas), (turn,), np.zeros(3, int), omegas, phases)
+
+
+def hopf() -> Bifurcation:
+    """A Hopf point of an equilibrium, with its eigenvector."""
+    vectors = np.array([[1.0, -0.5j]])
+    return Bifurcation(0.5, BifurcationKind.HOPF, 1e-9, at_rest(), "a", 1.5, 2j, vectors=vectors, lyapunov=-0.1)
+
+
+def curve() -> Curve:
+    """A curve of folds in two parameters, with a cusp."""
+    values = np.array([[0.1, 0.2], [0.2, 0.3], [0.3, 0.2]])
+    cusp = CurvePoint("cusp", (0.2, 0.3), np.array([0.1, -0.1]))
+    states, none = np.zeros((3, 2)), np.zeros(3)
+    return Curve(ROTORS, BifurcationKind.FOLD, ("a", "b"), values, states, none, np.zeros(3, int), (cusp,), ("a", "b"))
 
 
 def swept(x: np.ndarray, low: float, high: float) -> Sweep:
@@ -136,10 +157,11 @@ def every_kind() -> dict[str, Labelled]:
             state, np.array([-0.1, 0.1]), np.full(2, 0.01), 0.0, 0.01, np.array([[0.0, 0.5], [0.5, 0.0]]), 20.0
         ),
         orbit_at(1.2),
-        Equilibrium(
-            ROTORS, np.array([0.1, -0.1]), np.array([0.0, -1.5 + 0.5j]), ("theta",), np.array([0.25]), 1e-16, 4
-        ),
+        at_rest(),
+        hopf(),
+        curve(),
         branch(),
+        Diagram((branch(), branch())),
         Skeleton((branch(), branch())),
         basin(),
         Probe(

@@ -120,9 +120,12 @@ class Bifurcation(Labelled):
 
     @property
     def data(self) -> xr.Dataset:
-        """The solution, and the vectors over their number, components and nodes."""
-        data = self.solution.data
-        return data.assign({self.name or "value": self.value, "vectors": (("vector", "entry"), self.vectors)})
+        """The solution, the value of the parameter and the vectors, if there are any."""
+        data = self.solution.data.assign({self.name or "value": ((), self.value, {"long_name": "bifurcation value"})})
+        if self.vectors.size:
+            words = {"long_name": "directions of the branches that leave"}
+            data["vectors"] = (("vector", "entry"), self.vectors, words)
+        return data
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:

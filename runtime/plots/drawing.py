@@ -15,7 +15,7 @@ from synchain.models.spectra.spectrum import Spectrum
 
 from ..bifurcation.equilibrium import Equilibrium
 from ..bifurcation.periodic_result import PeriodicOrbit
-from ..bifurcation.results import Branch, Curve, Diagram
+from ..bifurcation.results import Bifurcation, Branch, Curve, Diagram
 from ..bifurcation.skeleton import Skeleton
 from ..results.result import Result
 from ..stability.cluster_exponents import BlockVerdict, ClusterExponents
@@ -206,6 +206,11 @@ def _(value: PeriodicOrbit, axes: Axes, **style: Any) -> Axes:
         axes.plot(points[:, 0, node], points[:, min(1, components - 1), node], **DOTS, markersize=6.0, color=ORANGE)
     axes.set(xlabel=symbol(names[0]), ylabel=symbol(names[1]))
     return axes
+
+
+@_draw.register
+def _(value: Bifurcation, axes: Axes, **style: Any) -> Axes:
+    return _draw(value.solution, axes, **style)
 
 
 @_draw.register
