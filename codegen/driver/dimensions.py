@@ -60,4 +60,8 @@ class ModeDimensions(NamedTuple):
     jumps: int
     """1 if slip begins with a jump of acceleration, else 0."""
     rows: int
-    """Contacts of all nodes."""
+    """Contacts, or rows of all nodes."""
+    felt: int
+    """The largest number of rows of a node."""
+    contacts: int
+    """Groups of memory for the output of `pushes`, and for what the driver stores behind it."""

@@ -16,7 +16,7 @@ from ..simd.addresses import address
 from ..simd.lanes import any_lane, broadcast, lane_bits, load, maximum, minimum, select, store
 from .cells import REPEATING, aligned, begin, fill, outcome, put, restart, turn_over, watch
 from .clock_slots import *
-from .contacts import change_modes
+from .contact_modes import begin_contacts, pass_events
 from .control import accept_series, advance, aim, arrive, judge, pause, wrap
 from .dense import inside
 from .frames import GONE, LENGTHS, NEXT, PARTS, PRODUCTS, SHIFT, VOLUMES, close_block, drain, orthogonalise
@@ -32,30 +32,6 @@ BETWEEN_SCALINGS = 8
 LENGTH = 1
 # Entry of `control`: how many times the tolerance of the orbit the modes are allowed.
 LOOSENESS = 8
-
-
-@njit(error_model="numpy")
-def brake(i, factor, modes, registers, owners):
-    """Multiply the velocities of deviations at contact i."""
-    for register in range(registers):
-        for c in range(owners.size):
-            if owners[c] == i:
-                store(modes, owners.size * register + c, factor * load(modes, owners.size * register + c, LANES))
-
-
-@njit(error_model="numpy")
-def saltate(i, before, strengths, deviations, registers, orbit, owners, dims, release):
-    """Change deviations by an event of contact i; `before` is its mode before."""
-    y, out = orbit.y, orbit.friction.out
-    after = y[2 * dims.nodes + i]
-    if before == 0.0:
-        if dims.jumps:
-            for register in range(registers):
-                release(i, after, orbit.clock[TIME], y, strengths, deviations, register)
-        return
-    pushed, pulled = out[4 * dims.nodes + i], out[5 * dims.nodes + i]
-    factor = 0.0 if after == 0.0 else pushed / pulled if after > 0.0 else pulled / pushed
-    brake(i, factor, deviations, registers, owners)
 
 
 @njit(error_model="numpy")
@@ -139,18 +115,12 @@ def renew(cell, spans, control, clock):
 
 
 @njit(error_model="numpy")
-def begin_deviations(cell, old, modes, orbit, dims):
+def begin_deviations(cell, old, modes, orbit, dims, functions):
     """Let the deviations of a cell begin; return True if a contact sticks, which takes their velocities at once."""
     take_in(modes.vectors[cell], old, modes.registers, modes.owners.size)
     for k in range(modes.registers * LANES):
         modes.powers[k] = 0.0
-    sticks = False
-    if CONTACTS:
-        for i in range(dims.nodes):
-            if orbit.y[2 * dims.nodes + i] == 0.0:
-                brake(i, 0.0, old, modes.registers, modes.owners)
-                sticks = True
-    return sticks
+    return begin_contacts(old, modes, orbit, dims, functions) if CONTACTS else False
 
 
 @njit(error_model="numpy")
@@ -192,13 +162,7 @@ def take_step(taken, carried, modes, orbit, dims, functions):
                 drop(old, modes.powers, active, modes.owners.size)
     largest = advance(clock, y, t, t_new, accept, orbit.y_new, dims)
     if CONTACTS:
-        for i in range(dims.nodes):
-            orbit.slips[i] = y[2 * dims.nodes + i]
-        change_modes(accept, t_new, y, orbit.friction)
-        for i in range(dims.nodes):
-            if y[2 * dims.nodes + i] != orbit.slips[i]:
-                saltate(i, orbit.slips[i], strengths, old, active, orbit, modes.owners, dims, functions.release)
-                landed = landed or y[2 * dims.nodes + i] == 0.0
+        landed = pass_events(accept, t_new, strengths, old, active, modes, orbit, dims, functions) or landed
     if SERIES:
         wrap(clock)
     return taken, largest, Carried(old, new, fresh, parted, landed, cut_at)
@@ -212,7 +176,7 @@ def run_block(cell, carried, rows, misfits, modes, orbit, nodes, panels, travell
     while True:
         # 1. begin the deviations anew, or cut where a body has landed or the last cut is a block ago
         if carried.fresh:
-            sticks = begin_deviations(cell, carried.old, modes, orbit, dims)
+            sticks = begin_deviations(cell, carried.old, modes, orbit, dims, functions)
             carried = Carried(carried.old, carried.new, False, False, carried.landed or sticks, carried.cut_at)
         if CONTACTS:  # noqa: SIM102  (Numba leaves out what a constant excludes)
             if legs.panels.shape[0] > 0:
@@ -302,9 +266,9 @@ def march(functions, dims, owners, first, last, inputs, deviations, outputs, pro
     rows, panels = Rows(start, values, spans, control), Panels(panel_rows, address(weights, 0))
 
     # 1. Workspace of the orbit.
-    size, kinds, contact_size = dims.dimension, dims.strengths, 9 * dims.nodes + 2
+    size, kinds, contact_size = dims.dimension, dims.strengths, dims.contacts
     lane_size, dense_size = CLOCK + 2 * size + dims.parameters + len(REPEATING), dims.dense_rows * size + dims.workspace
-    block = aligned(lane_size + 2 * size + dense_size + contact_size + dims.shared + dims.nodes)
+    block = aligned(lane_size + 2 * size + dense_size + contact_size + dims.shared + size)
     clock, y, y_new = address(block, 0), address(block, CLOCK), address(block, lane_size)
     middle, dense = address(y_new, size), address(y_new, 2 * size)
     out = address(dense, dense_size)

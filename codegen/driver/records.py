@@ -79,7 +79,7 @@ class Orbit(NamedTuple):
     y_new: Any
     dense: Any
     shared: Any  # Jacobians of a step, or their series, for the modes
-    slips: Any  # (nodes): modes of the contacts before an event
+    slips: Any  # modes of the contacts before an event; of rows, the state
     control: Any
     friction: Friction
 

@@ -321,7 +321,7 @@ def after_jump(notes, lane, first, size, friction):
 
 
 @njit(error_model="numpy")
-def settle(lane, first, size, friction):
+def project_held(lane, first, size, friction):
     """Set the impulses that put the held rows of a node onto their surfaces; return True if there are any."""
     out, dims, felt = friction.out, friction.dims, friction.dims.felt
     matrix, right, chosen = np.empty((size, size)), np.empty(size), np.zeros(size, np.bool_)
@@ -391,12 +391,12 @@ def change_modes(moved, t, y, friction):
                     if outcome == 2:
                         put(friction.clock, RUSH, lane, math.inf)
                 elif part == 0:
-                    struck = settle(lane, first, size, friction) or struck
+                    struck = project_held(lane, first, size, friction) or struck
                 elif closed:
                     after_jump(notes[lane], lane, first, size, friction)
                     if not decide(notes[lane], lane, first, size, friction):
                         put(friction.clock, RUSH, lane, math.inf)
-                    settle(lane, first, size, friction)
+                    project_held(lane, first, size, friction)
                 first += size
         if struck or part == 1:
             strike(t, y, friction)

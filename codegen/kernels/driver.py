@@ -82,7 +82,7 @@ class Driver:
     def functions(self) -> tuple[str, ...]:
         """Functions of the scene and recorders, in the order of the driver's arguments."""
         if self.kind is KernelKind.MODES:
-            return "step", "carry", "pushes", "release"
+            return "step", "carry", "pushes", *(("strike", "saltate") if self.rows else ("release",))
         return "step", "pushes", *["strike"] * self.rows, "section", "values", *RECORDERS
 
     def recorder(self, entry: str) -> Recorder:
@@ -109,7 +109,8 @@ class Driver:
             "SERIES": self.series,
         }
         of_contacts = ["rows" if self.rows else "contacts", "passages"]
-        contacts, landings = (of_contacts, ["landings"]) if self.contacts else ([], [])
+        of_modes = "row_modes" if self.rows else "contact_modes"
+        contacts, landings = (of_contacts, ["landings", of_modes]) if self.contacts else ([], [])
         frames = ["frames", "lifted_frames"] if self.kind is KernelKind.FRAME else []
         last = ["propagators", *landings, "frames", "modes"] if modes else ["spread", "sweep", *frames]
         pieces = (f"driver.{name}" for name in ("dense", "cells", "control", *contacts, *last))

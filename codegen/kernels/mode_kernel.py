@@ -30,6 +30,7 @@ from ..simd import lanes
 from ..steps.blocks import analyse
 from ..steps.contact_step import event_functions, register
 from ..steps.elimination import plan, write_factors, write_solve
+from ..steps.row_step import contact_groups, most_rows, row_count, row_events
 from ..steps.step import StepWriter, node_function, scaling
 from ..steps.unrolled_step import UnrolledStep, stage_state
 from ..taylor import write_tangent
@@ -71,7 +72,7 @@ class ModeKernel(KernelSource):
 
     @property
     def functions(self) -> tuple[str, ...]:
-        return ("step", "carry", *(("pushes", "release") if self.driver.contacts else ()))
+        return self.driver.functions if self.driver.contacts else ("step", "carry")
 
     @property
     def arguments(self) -> tuple[Any, ...]:
@@ -104,14 +105,16 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
     else:
         workspace = 0
         functions, shared, count = _stages(variation, method, names)
+    rows = events is not None and plain.has_rows
+    of_events = row_events(variation, events, names) if events and rows else event_functions(variation, names)
     deviations = f"{variation.size} deviations, {width} modes a register"
     constants = {"WIDTH": 1, "LANES": width, "DENSE": plain.sticks or method.series}
     return ModeKernel(
         describe(named, method, (), count, deviations),
-        module(constants, functions, event_functions(variation, names)),
+        module(constants, functions, of_events),
         equations,
         method,
-        Driver(KernelKind.MODES, width, contacts=plain.sticks, series=method.series),
+        Driver(KernelKind.MODES, width, contacts=plain.sticks, series=method.series, rows=plain.has_rows),
         ModeDimensions(
             nodes=plain.n,
             dimension=plain.dimension,
@@ -123,7 +126,9 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
             strengths=len(variation.parameters),
             shared=shared,
             jumps=int(events is not None and bool(events.exits)),
-            rows=plain.n,
+            rows=row_count(plain) if rows else plain.n,
+            felt=most_rows(plain) if rows else 0,
+            contacts=contact_groups(plain),
         ),
         (-1,) * variation.size if events is None else tuple(events.owners),
     )

@@ -34,9 +34,9 @@ from ..program.printers import LANES
 from ..program.statements import Function, Role, operations
 from ..simd import lanes
 from ..steps.blocks import NodeBlocks, analyse
-from ..steps.contact_step import SIDES, push_functions
+from ..steps.contact_step import push_functions
 from ..steps.looped_step import LoopedStep
-from ..steps.row_step import most_rows, row_count, row_functions
+from ..steps.row_step import contact_groups, most_rows, row_count, row_functions
 from ..steps.sparse_plan import FILL_LIMIT, SparsePlan, sparse_plan
 from ..steps.step import StepWriter, function_name, node_function, scaling
 from ..steps.unrolled_step import UnrolledStep
@@ -175,7 +175,7 @@ def emit(
             stops=int(recording.stop is not None),
             rows=rows,
             felt=felt,
-            contacts=SIDES * rows + 2 + (5 + felt) * rows if plain.sticks else 0,
+            contacts=contact_groups(plain),
         ),
         recording.multiplicity if compares and recording.multiplicity is not None else (1,) * equations.n,
         rule_of(method),

@@ -91,6 +91,9 @@ def _of_modes(driver: Driver) -> tuple[dict[str, Any], tuple[Any, ...], tuple[An
         "pushes": types.void(one, *[ADDRESS] * 3),
         # node, state of the contact, t; y, strengths, deviations; register
         "release": types.void(INTEGER, NUMBER, NUMBER, *[ADDRESS] * 3, INTEGER),
+        "strike": types.void(one, *[ADDRESS] * 3),
+        # row, t; y before and after, strengths, deviations; register
+        "saltate": types.void(INTEGER, NUMBER, *[ADDRESS] * 4, INTEGER),
     }
     deviations, outputs = (READ_ONLY, CUBE, MATRIX), (MATRIX, MATRIX, COUNTS)
     # batches, places, panels, weights, travellers, gains, misfits; legs, shares, where; tracks

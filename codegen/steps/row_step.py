@@ -20,15 +20,17 @@ from itertools import islice
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.saltation import Events
+from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import Edge, Node
 from synchain.models.mechanics.rows import Law, Row, forces
 
-from ..program.expressions import Expression, Load, Name, Number, plus
+from ..program.expressions import Compare, Expression, Load, Name, Number, call, plus
 from ..program.lowering import lower
 from ..program.passes import Names, real, share
-from ..program.statements import Assign, Function, Role, Statement, accumulate, let, store
+from ..program.statements import Assign, Function, If, Role, Statement, accumulate, let, store
 from .blocks import assigned
-from .contact_step import SIDES, jump_sides, parameter_loads, time_gaps
+from .contact_step import SIDES, jump_sides, parameter_loads, register, time_gaps
 from .places import Joint, Span, StateLayout, link_ends, named
 from .safe_names import NAMES
 from .step import lane
@@ -43,6 +45,14 @@ LEVEL, GAP, MODE, SPEED, RATE, RATIO = range(6)
 def most_rows(equations: Equations) -> int:
     """Return the largest number of rows of a node."""
     return max(len(node.rows) for node in equations.nodes)
+
+
+def contact_groups(equations: Equations) -> int:
+    """Return the number of groups of the output of `pushes`, with those that the driver stores behind it."""
+    if not equations.has_rows:
+        return (SIDES * equations.n + 2) * equations.sticks
+    rows = row_count(equations)
+    return SIDES * rows + 2 + (5 + most_rows(equations)) * rows
 
 
 def row_count(equations: Equations) -> int:
@@ -61,6 +71,31 @@ def row_functions(equations: Equations, names: Names, looped: bool) -> list[Func
         Function("pushes", arguments, about, tuple(written.pushes()), role=Role.ENTRY),
         Function("strike", arguments, strike, tuple(written.strike()), role=Role.ENTRY),
     ]
+
+
+def row_events(variation: Variation, events: Events, names: Names) -> list[Function]:
+    """Return the functions of a kernel that carries deviations: those of the orbit, and `saltate` for one register."""
+    orbit, size, strengths = variation.orbit, variation.size, [s.name for s in variation.parameters]
+    used = set().union(*(e.free_symbols for e in events.expressions))
+    loads = [(name, "before", k) for k, name in enumerate(orbit.state)]
+    loads += [(s.name, "after", k) for k, s in enumerate(events.after)]
+    loads += [(name, "after", k) for k, name in enumerate(orbit.parameters, start=orbit.dimension)]
+    body: list[Statement] = [let("t", call("broadcast", "now", "LANES"))]
+    body += [
+        let(name, call("broadcast", Load(array, Number(k), None), "LANES"))
+        for name, array, k in loads
+        if real(name) in used
+    ]
+    body += [let(s, register("strengths", len(strengths), k)) for k, s in enumerate(strengths) if real(s) in used]
+    body += [let(s.name, register("modes", size, k)) for k, s in enumerate(events.deviations)]
+    for number, jump in enumerate(events.jumps):
+        line = share(jump, names.fresh("z"))
+        stores = [store("modes", size * Name("which") + c, lower(e)) for c, e in enumerate(line.results)]
+        body.append(If(Compare("==", Name("row"), Number(number)), (*assigned(line), *stores)))
+    about = "Change deviations by an event of a row; behind the last row: by a start on surfaces."
+    arguments = ("row", "now", "before", "after", "strengths", "modes", "which")
+    saltate = Function("saltate", arguments, about, tuple(body), role=Role.ENTRY)
+    return [*row_functions(orbit, names, looped=False), saltate]
 
 
 def _full(rows: Sequence[Row], row: Row) -> list[sp.Expr]:

@@ -15,13 +15,14 @@ Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (S
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
 from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Edge
 from ..mechanics.contact import SLIP
+from ..mechanics.rows import Law, projection
 from .equations import Equations
 
 Entry = tuple[tuple[int, int], sp.Expr]
@@ -35,16 +36,23 @@ class Events:
     owners: tuple[int, ...]  # for each row the contact whose velocity the row is, -1 for a position
     # For each contact the rows of S at the start of slip with w > 0, and with w < 0; empty if S = I.
     exits: tuple[tuple[tuple[Entry, ...], tuple[Entry, ...]], ...] = ()
+    # Of rows: the deviation after an event of each row, and last after a start with held rows, in the symbols of the state
+    # before, of the state `after` the event and of the `deviations`.
+    jumps: tuple[tuple[sp.Expr, ...], ...] = ()
+    after: tuple[sp.Symbol, ...] = ()
+    deviations: tuple[sp.Symbol, ...] = ()
 
     def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Events:
         """Return the events with every expression changed."""
         both = ((tuple((key, change(e)) for key, e in side) for side in pair) for pair in self.exits)
-        return Events(self.owners, tuple((up, down) for up, down in both))
+        jumps = tuple(tuple(map(change, jump)) for jump in self.jumps)
+        return replace(self, exits=tuple((up, down) for up, down in both), jumps=jumps)
 
     @property
     def expressions(self) -> tuple[sp.Expr, ...]:
         """All expressions."""
-        return tuple(e for pair in self.exits for side in pair for _, e in side)
+        of_exits = (e for pair in self.exits for side in pair for _, e in side)
+        return (*of_exits, *(e for jump in self.jumps for e in jump))
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,12 +91,98 @@ def _releases(orbit: Equations) -> tuple[tuple[_Release, _Release], ...]:
     return tuple(releases)
 
 
+def of_rows(orbit: Equations, links: Sequence[Sequence[sp.Matrix]]) -> Events:
+    """Return the events of the rows of one node, for deviations of which the links make the rates -sum links[b][c] d_c.
+
+    At an event of a gap h with the reset R the deviation becomes R_z d + (F+ - R_z F- - R_t) delta, with
+    delta = n d/(n F- + dh/dt) and n the gradient of h (Leine & Nijmeijer, chapter 7).
+    """
+    size, symbols = len(orbit.node.continuous), orbit.symbols(0)
+    z, after = symbols[:size], tuple(sp.Symbol(f"{s.name}_then", real=True) for s in symbols)
+    then = dict(zip(symbols, after, strict=True))
+    rates = [e.xreplace(orbit.at_node(0)) for e in orbit.node.rhs[:size]]
+    d = sp.symbols(f"deviation_:{size * len(links)}", real=True)
+    parts = [sp.Matrix(d[b * size : (b + 1) * size]) for b in range(len(links))]
+    added = [-sum((link * part for link, part in zip(row, parts, strict=True)), sp.zeros(size, 1)) for row in links]
+
+    def gradient(e: sp.Expr) -> sp.Matrix:
+        return sp.Matrix([[derivative(e, s) for s in z]])
+
+    jumps, rows = [], orbit.rows_at(0)
+    held = [row for row in rows if row.law is not Law.RESET]
+    for row in rows:
+        mode, reset = row.mode, list(z)
+        # the gap that closes: off the surface the level, on it the distance of the force x from its limit
+        if row.law is Law.RESET:
+            reset, n, n_t, turned = (
+                [dict(row.sets).get(s, s) for s in z],
+                gradient(row.level),
+                derivative(row.level, TIME),
+                sp.S.Zero,
+            )
+        else:
+            limit = row.ratio if row.law is Law.SIGN else sp.S.Zero
+            side, off = (then[mode], mode**2) if row.law is Law.SIGN else (-sp.S.One, mode)
+            n = off * gradient(row.level) + (1 - off) * (gradient(limit) - side * gradient(row.x))
+            n_t = off * derivative(row.level, TIME) + (1 - off) * (
+                derivative(limit, TIME) - side * derivative(row.x, TIME)
+            )
+            turned = -(1 - off) * side
+        if row.law is Law.STOP:
+            # a stop that is closed after the impact has not rebounded
+            kick = mode * (1 + row.ratio * then[mode]) * row.speed / row.stiffness[held.index(row)]
+            reset = [s + push * kick for s, push in zip(z, row.push, strict=True)]
+        slopes = sp.Matrix([gradient(e) for e in reset])
+        first, last = sp.Matrix(rates), sp.Matrix([e.xreplace(then) for e in rates])
+        gained = last - slopes * first - sp.Matrix([derivative(e, TIME) for e in reset])
+        passing = (n * first)[0] + n_t
+        answer = sp.Matrix([row.answer])
+        jump: list[sp.Expr] = []
+        for part, more in zip(parts, added, strict=True):
+            lead = ((n * part)[0] + turned * (answer * more)[0]) / passing
+            jump += list(slopes * part + gained * lead)
+        jumps.append(tuple(jump))
+
+    # a start with held rows: deviations along the surfaces alone
+    flat: list[sp.Expr] = []
+    for part in parts:
+        moved = list(projection(rows, list(part)))
+        for row in held:
+            if row.law is Law.STOP:
+                depth = (1 - row.mode) * (gradient(row.level) * part)[0] / row.stiffness[held.index(row)]
+                moved = [e - lift * depth for e, lift in zip(moved, row.lift, strict=True)]
+        flat += moved
+    return Events((-1,) * len(d), (), (*jumps, tuple(flat)), after, d)
+
+
+def check_links_of_events(equations: Equations) -> None:
+    """Raise ValueError for links with the states that a row changes at once: the order of equal events then matters."""
+    if not equations.has_rows:
+        return
+    node = equations.node
+    changed = {
+        k
+        for row in node.rows
+        for k in range(len(node.continuous))
+        if (row.law is not Law.SIGN or row.ratio != 1) and (row.push[k] != 0 or node.state[k] in dict(row.sets))
+    }
+    off = {mode: sp.S.One for edge in equations.edges for mode in edge.here[len(node.continuous) :]}
+    for edge in equations.edges:
+        for e in (each.xreplace(off) for each in edge.rhs):
+            if any(e.has(edge.there[k]) for k in changed):
+                raise ValueError(
+                    f"tangent dynamics: found links of {', '.join(str(node.state[k]) for k in sorted(changed))}, which events "
+                    "change at once, so the order of simultaneous events matters; expected links of states that no event changes"
+                )
+
+
 def check_tangents(equations: Equations) -> None:
-    """Raise ValueError for events whose saltation matrices are not supported."""
-    if equations.has_rows:
+    """Raise ValueError for networks of several nodes with rows, whose saltation matrices are not supported."""
+    if equations.has_rows and equations.n > 1:
         raise ValueError(
-            "tangent dynamics: found contacts of several coordinates, moving grounds or kinds, stops, resets or surfaces; "
-            "expected friction of one coordinate on a ground of constant velocity; run the network itself"
+            "tangent dynamics of a network: found contacts of several coordinates, moving grounds or kinds, stops, resets or "
+            "surfaces; expected one node, or friction of one coordinate on a ground of constant velocity; take the modes of "
+            "the synchronous motion, msf or exponents"
         )
 
 
@@ -111,12 +205,21 @@ def _force_slope(slope: sp.Matrix) -> sp.Expr:
 
 
 def of_mode(
-    equations: Equations, orbit: Equations, slope: sp.Matrix, strength: tuple[sp.Symbol, sp.Symbol], plane: bool
+    equations: Equations,
+    orbit: Equations,
+    slope: sp.Matrix,
+    strength: tuple[sp.Symbol, sp.Symbol],
+    links: Sequence[Sequence[sp.Matrix]],
 ) -> Events | None:
-    """Return the events of a mode of the synchronous orbit, on which the forces of links vanish."""
+    """Return the events of a mode of the synchronous orbit, on which the forces of links vanish.
+
+    links: what the links add to the rates of the mode while no row is held (`of_rows`); two by two in the plane.
+    """
     if not orbit.sticks:
         return None
-    check_tangents(equations)
+    if orbit.has_rows:
+        return of_rows(orbit, links)
+    plane = len(links) > 1
     releases = _releases(orbit)
     if releases:
         _check_springs(equations.edges)
@@ -141,6 +244,8 @@ def of_network(equations: Equations, names: Sequence[str] = ()) -> Events | None
     if not equations.sticks:
         return None
     check_tangents(equations)
+    if equations.has_rows:
+        return of_rows(equations, [[sp.zeros(len(equations.node.continuous))]])
 
     def entries(i: int, side: _Release) -> tuple[Entry, ...]:
         slopes = (*((j, g) for j, g in enumerate(side.gradient)), *((2 * n + k, g) for k, g in by_names(side.limit)))
@@ -166,6 +271,11 @@ def of_slots(
     """
     if not orbit.sticks:
         return None
+    if orbit.has_rows:
+        raise ValueError(
+            "cluster states: found contacts of several coordinates, moving grounds or kinds, stops, resets or surfaces; "
+            "expected friction of one coordinate on a ground of constant velocity"
+        )
     releases = _releases(orbit)
     if releases:
         _check_springs(equations.edges)

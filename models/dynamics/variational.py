@@ -135,11 +135,14 @@ def mode(equations: Equations, plane: bool = False, by_weight: bool = False) -> 
     alphas, betas = ((s,) for s in MODE)
     if len(slopes) > 1:
         alphas, betas = (tuple(sp.Symbol(f"{s.name}_{k + 1}", real=True) for k in range(len(slopes))) for s in MODE)
-    events = of_mode(equations, orbit, slopes[0], MODE, plane)
     real = jacobian - sum((s * push for s, push in zip(alphas, pushes, strict=True)), sp.zeros(size, size))
+    aside = sum((s * push for s, push in zip(betas, pushes, strict=True)), sp.zeros(size, size))
+    free = dict.fromkeys(orbit.symbols(0)[size:], sp.S.One)
+    turned, crossed = (jacobian - real).xreplace(free), aside.xreplace(free)
+    links = [[turned, -crossed], [crossed, turned]] if plane else [[turned]]
+    events = of_mode(equations, orbit, slopes[0], MODE, links)
     if not plane:
         return Variation(orbit, size, _entries(real), alphas, events)
-    aside = sum((s * push for s, push in zip(betas, pushes, strict=True)), sp.zeros(size, size))
     both = sp.Matrix(sp.BlockMatrix([[real, aside], [-aside, real]]))
     return Variation(orbit, 2 * size, _entries(both), (*alphas, *betas), events)
 

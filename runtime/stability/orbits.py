@@ -25,6 +25,7 @@ from synchain.codegen.integrators import Integrator
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.mode_inertia import inertia_of_modes
 from synchain.models.dynamics.reduction import without_drive
+from synchain.models.dynamics.saltation import check_links_of_events
 from synchain.models.dynamics.variational import PHASE, Variation, mode
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
@@ -90,6 +91,8 @@ class OrbitProblem:
         """
         scene = scene if scene.model.linked else _joined(scene, strengths)
         equations = without_drive(scene.equations, scene.parameters)
+        if np.any(strengths):
+            check_links_of_events(equations)
         variation, layers = _variation(equations, bool(np.iscomplexobj(strengths))), len(equations.layers)
         if strengths.size != len(strengths) * layers:
             raise ValueError(
@@ -151,7 +154,11 @@ class OrbitProblem:
     @property
     def lands(self) -> bool:
         """True if a deviation has two components, and a landing sets one of them to zero."""
-        return self.variation.events is not None and self.variation.size == self.components == 2
+        return (
+            self.variation.events is not None
+            and not self.variation.orbit.has_rows
+            and self.variation.size == self.components == 2
+        )
 
     @property
     def linear(self) -> bool:

@@ -154,5 +154,3 @@ def test_refusals_of_contacts() -> None:
         scene(contact(V**2 / 2, X**2 / 2, {X: sc.friction(-V) + 2 * sc.friction(-2 * V)}, {X: V}), 1.0, "dop853")
     with pytest.raises(ValueError, match=r"found the sliding velocity .*; expected a linear function of velocities"):
         scene(contact(V**2 / 2, X**2 / 2, {X: sc.friction(sp.sin(T))}, {X: V}), 1.0, "dop853")
-    with pytest.raises(ValueError, match="tangent dynamics: found contacts of several coordinates"):
-        sc.msf(scene(cart_pole(), 5.0, "taylor", 3, coupling="spring on x"))

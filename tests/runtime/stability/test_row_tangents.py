@@ -1,0 +1,110 @@
+"""Deviations through impacts, resets, static drops and sliding: multipliers in closed form and in 40 digits.
+
+The values of the cart-pole come from a hand-written pair of equations and differences of its orbits; those of the impact
+oscillator from linear flows and Newton's method in 40 digits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import synchain as sc
+
+X, V, T, TH, OM = sp.symbols("x v t th om")
+R = sp.Rational
+FINE = {"integrator": "taylor", "record": (), "rtol": 1e-11, "atol": 1e-13}
+IMPACT = sc.Lagrangian(
+    V**2 / 2,
+    X**2 / 2,
+    {X: sp.cos(R(4, 5) * T) / 2 - V / 10},
+    coordinates={X: V},
+    events=[sc.Stop(R(3, 5) - X, R(7, 10))],
+)
+
+
+def lone(node, **initial: float) -> sc.Scene:
+    return sc.Scene(
+        node, topology=sc.graphs.chain(1), initial={name: [value] for name, value in initial.items()}, **FINE
+    )
+
+
+def ring(node, coupling, **initial: float) -> sc.Scene:
+    start = {name: [value] * 3 for name, value in initial.items()}
+    return sc.Scene(node, coupling, sc.graphs.ring(3), initial=start, **FINE)
+
+
+def multipliers(scene: sc.Scene) -> np.ndarray:
+    return np.sort_complex(sc.periodic_orbit(scene, 1).multipliers)
+
+
+def test_impact_oscillators_in_a_ring() -> None:
+    """One impact a period; multipliers, and exponents of modes: complex pairs have ln(e)/T - 0.05."""
+    pair = -0.07497024465844425 + 0.4666788456971145j * np.array([-1, 1])
+    assert multipliers(lone(IMPACT, x=0.4, v=-0.5)) == pytest.approx(pair, abs=1e-12)
+    found = sc.exponents(ring(IMPACT, "spring", x=0.4, v=-0.5), [0.0, 0.3, 0.45]).exponent
+    assert found == pytest.approx([-0.095413264323899, -0.095413264323899, -0.086012350043361], abs=1e-12)
+
+
+def test_a_ball_on_a_shaken_table() -> None:
+    """The derivative of the flight map: a pair of multipliers with the product e**2."""
+    phase, late = 0.1249440531877598, sp.Symbol("late")
+    gap = X - sp.sin(2 * sp.pi * (T + late)) / 80
+    ball = sc.Lagrangian(
+        V**2 / 2, X, coordinates={X: V}, parameters={late: phase + 0.5}, events=[sc.Stop(gap, R(4, 5))]
+    )
+    top = np.sin(2 * np.pi * phase) / 80 + 0.125
+    pair = 0.2549107471568807 + 0.7583010688268353j * np.array([-1, 1])
+    assert multipliers(lone(ball, x=top, v=0.0)) == pytest.approx(pair, abs=1e-11)
+
+
+def test_stick_static_drop_and_stop() -> None:
+    """A cart-pole that sticks, lets go with a jump and is hit once a period: one direction is lost in stick."""
+    pull = R(3, 5) * sc.friction(R(4, 5) * sp.cos(R(6, 5) * T) - V)
+    cart = sc.Lagrangian(
+        V**2 / 2 + (V**2 + 2 * V * OM * sp.cos(TH) + OM**2) / 4,
+        X**2 / 2 - sp.cos(TH) / 2,
+        {X: pull - V / 4, TH: -OM / 4},
+        coordinates={X: V, TH: OM},
+        friction=sc.friction_law("sign(w)", static="6/5"),
+        contact="set-valued",
+        events=[sc.Stop(R(1, 5) - X, R(7, 10))],
+    )
+    start = {"x": 0.00282212838818, "th": -0.63680895403904, "v": 0.69619124352542, "om": -0.43433774329057}
+    inner = 0.02909021801 + 0.21253561006j * np.array([-1, 1])
+    right = np.array([-0.2183177345564, 0.0, *inner])
+    assert np.abs(multipliers(lone(cart, **start)) - right).max() < 2e-11
+    found = sc.exponents(ring(cart, "spring on x", **start), [0.3, 0.9]).exponent
+    assert found == pytest.approx([-0.202301849904, -0.115207487003], abs=2e-11)
+
+
+def test_integrate_and_fire() -> None:
+    """Locked 1:1 to its drive: the multiplier is F+/F- exp(-T)."""
+    cell = sc.Field({V: R(6, 5) + R(3, 10) * sp.sin(2 * sp.pi * T / R(17, 10)) - V}, events=[sc.Reset(V - 1, {V: 0})])
+    assert multipliers(lone(cell, v=0.3)) == pytest.approx([0.548231306332175], abs=1e-12)
+
+
+def test_links_that_a_sliding_node_balances() -> None:
+    """On x + c y = 0 a deviation decays as exp(-t/c), whatever the strength of links of y."""
+    relay = sc.Field({X: V, V: -sp.sign(X + R(7, 10) * V) + sp.cos(T) / 10}, contact="set-valued")
+    assert sc.exponents(ring(relay, "v->v", x=1.0, v=0.0), [0.0, 0.5]).exponent == pytest.approx(
+        [-1 / 0.7] * 2, abs=1e-9
+    )
+
+
+@pytest.mark.parametrize("coupling", ["damper", "v->x"])
+def test_links_of_states_that_an_impact_changes_are_refused(coupling: str) -> None:
+    with pytest.raises(
+        ValueError, match=r"found links of v, which events change at once.*; expected links of states that no"
+    ):
+        sc.exponents(ring(IMPACT, coupling, x=0.4, v=-0.5), [0.3])
+
+
+def test_networks_of_several_nodes_are_refused() -> None:
+    with pytest.raises(ValueError, match="tangent dynamics of a network: found contacts of several coordinates"):
+        sc.lyapunov_spectrum(ring(IMPACT, "spring", x=0.4, v=-0.5))
+    with pytest.raises(ValueError, match=r"found .*set-valued|found contacts"):
+        sc.lyapunov_spectrum(
+            ring(IMPACT, "spring", x=0.4, v=-0.5).replace(topology=sc.graphs.ring(9), initial={"x": [0.4] * 9})
+        )
