@@ -294,6 +294,7 @@ def as_function(frequency: sp.Expr) -> Callable[..., float]:
     return value
 
 
+@lru_cache(maxsize=1024)
 def names_in(frequency: sp.Expr) -> tuple[str, ...]:
     """Return the names of the parameters that a frequency depends on."""
     return tuple(sorted(s.name for s in frequency.free_symbols))

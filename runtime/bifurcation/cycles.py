@@ -57,7 +57,7 @@ LOOKS = 16
 RESCALED = 2.0
 """The extents are measured again where the rates change by this factor (a choice)."""
 
-NOISE = 3.0
+NOISE = 0.3
 """Integration error of an image that counts as zero, in units of the tolerance and the size of the motion (a choice)."""
 
 MOST_STEPS, ASTRAY = 30, 1e4

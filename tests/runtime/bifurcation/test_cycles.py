@@ -209,3 +209,115 @@ def test_small_multipliers_of_many_segments() -> None:
     matrices = np.array([left @ np.diag(each) @ np.linalg.inv(right) for left, each, right in cycle])
     found = np.sort(product_eigenvalues(matrices).real)
     np.testing.assert_allclose(found, np.sort(numbers.prod(axis=0)), rtol=1e-6)
+
+
+# --- branches ---
+def at(branch: sc.results.Branch, value: float) -> sc.results.PeriodicOrbit:
+    return next(o for v, o in zip(branch.values, branch.orbits, strict=True) if v == value)
+
+
+def test_the_unstable_cycles_of_lorenz_are_born_at_its_hopf_point() -> None:
+    """Subcritical at r = 470/19 (C); cycles (F)."""
+    node = sc.Field({"x": "10*(y - x)", "y": "r*x - y - x*z", "z": "x*y - 8*z/3"}, parameters={"r": 20.0})
+    rest = sc.equilibrium(sc.Scene(node, initial={"x": 7, "y": 7, "z": 19}))
+    (hopf,) = sc.follow(rest, "r", to=26.0).points["Hopf"]
+    assert hopf.value == pytest.approx(470 / 19, abs=1e-11)
+    assert hopf.frequency == pytest.approx(9.624530063715754, abs=1e-11)
+    assert hopf.lyapunov > 0.0
+    cycles = sc.follow(hopf, "r", to=20.0, values=[24.0, 22.0, 20.0])
+    for r, period, multiplier in (
+        (24.0, 0.679336764198, 1.03208829783),
+        (22.0, 0.764386427426, 1.160763014),
+        (20.0, 0.876552253492, 1.402070818),
+    ):
+        orbit = at(cycles, r)
+        assert orbit.period == pytest.approx(period, abs=2e-12)
+        assert orbit.multipliers[0].real == pytest.approx(multiplier, abs=1e-9)
+        assert not orbit.stable
+
+
+def test_period_doublings_of_rossler_are_followed_both_ways() -> None:
+    """(F)"""
+    node = sc.Field({"x": "-y - z", "y": "x + y/5", "z": "1/5 + z*(x - c)"}, parameters={"c": 2.5})
+    single = sc.follow(sc.periodic_orbit(sc.Scene(node, initial={"x": 1, "y": 1, "z": 0})), "c", to=3.0)
+    assert single[0].period == pytest.approx(5.748991183278, abs=1e-12)
+    assert single[0].multipliers[1].real == pytest.approx(-0.769693641734, abs=1e-11)
+    (first,) = single.points["period doubling"]
+    assert first.value == pytest.approx(2.832445027862, abs=1e-11)
+    assert first.solution.period == pytest.approx(5.76982001651, abs=1e-10)
+    double = sc.follow(first, "c", to=3.9, values=[3.2])
+    assert at(double, 3.2).period == pytest.approx(11.53108104121, abs=1e-10)
+    assert at(double, 3.2).multipliers[1].real == pytest.approx(0.154192527644, abs=1e-11)
+    (second,) = double.points["period doubling"]
+    assert second.value == pytest.approx(3.83735816841, abs=1e-11)
+    assert second.solution.period == pytest.approx(11.5726888045, abs=1e-9)
+    back = sc.follow(double[-1], "c", to=2.5)
+    assert [str(each.kind) for each in back.bifurcations] == ["period doubling"] * 2
+    assert back.bifurcations[-1].value == pytest.approx(first.value, abs=1e-9)
+    assert back.ends == ("period doubling at c = 2.832445",)
+
+
+def test_duffings_resonance_goes_through_both_folds() -> None:
+    """The parameter moves the period of the drive; folds by Fourier collocation and a bordered Newton method (F)."""
+    node = sc.Field({"x": "v", "v": "-x - x**3 - v/10 + 0.3*cos(w*t)"}, parameters={"w": 0.8})
+    first = sc.periodic_orbit(sc.Scene(node, initial={"x": 0.5, "v": 0}, transient=100))
+    branch = sc.follow(first, "w", to=2.2, largest_step=0.04)
+    folds = [each.value for each in branch.points["fold"]]
+    assert folds == pytest.approx([1.7797195242986, 1.3242362007706], abs=5e-13)
+    assert len(branch) > 100
+    assert branch.growing.max() == 1
+
+
+def test_modes_leave_the_synchronous_resonance_of_a_pair() -> None:
+    """Branch points of the mode across, on the branch of one node (F)."""
+    node = sc.Field({"x": "v", "v": "-x - x**3 - v/10 + 0.3*cos(w*t)"}, parameters={"w": 1.2})
+    i, j, W = sc.ends(node)
+    pull = sc.Rates({i.v: K * W * (j.x - i.x)}, {K: 0.05})
+    two = sc.Scene(node, pull, sc.graphs.chain(2), initial={"x": 0.5, "v": 0}, transient=100)
+    branch = sc.follow(sc.periodic_orbit(two), "w", to=2.0)
+    points = branch.points["branch point"]
+    assert [each.value for each in points] == pytest.approx([1.68034293778, 1.3252959488], abs=1e-10)
+    assert {each.mode for each in points} == {"eigenvalue -2"}
+    other = sc.follow(points[0], "w", within=(1.5, 2.0))
+    apart = [abs(orbit.state[0] - orbit.state[1]) for orbit in other.orbits]
+    assert max(apart) > 0.1
+    assert other[-1].classes == (0, 1)
+
+
+@pytest.mark.parametrize(("name", "to", "torus"), [("b", -1.8, -1.6294054545460515), ("kap", 0.6, 0.440088365916)])
+def test_a_travelling_wave_loses_its_stability_in_a_torus(name: str, to: float, torus: float) -> None:
+    """Stuart-Landau ring of eight (C)."""
+    scene, period = wave(8, 1, 0.3, -1.0)
+    orbit = sc.periodic_orbit(scene, start=scene.y0, period=period)
+    assert orbit.period == pytest.approx(8.228330594465563, abs=1e-12)
+    assert orbit.multipliers[1] == pytest.approx(-0.855495443372 + 0.078015999042j, abs=1e-11)
+    branch = sc.follow(orbit, name, to=to)
+    (found,) = branch.points["torus"]
+    assert found.value == pytest.approx(torus, abs=1e-11)
+
+
+def test_cycles_of_a_bautin_cell_turn_at_their_fold() -> None:
+    """r' = r (b + r^2 - r^4): unstable r = 1/2 and stable r = sqrt(3)/2 at b = -3/16, fold at -1/4 (C)."""
+    growth = "(b + (x**2 + y**2) - (x**2 + y**2)**2)"
+    node = sc.Field({"x": f"x*{growth} - y", "y": f"y*{growth} + x"}, parameters={"b": -0.5})
+    rest = sc.equilibrium(sc.Scene(node, initial={"x": 0, "y": 0}))
+    (hopf,) = sc.follow(rest, "b", to=0.5).points["Hopf"]
+    cycles = sc.follow(hopf, "b", within=(-1.0, 0.5), values=[-3 / 16])
+    (fold,) = cycles.points["fold"]
+    assert fold.value == pytest.approx(-0.25, abs=1e-12)
+    unstable, stable = (o for v, o in zip(cycles.values, cycles.orbits, strict=True) if v == -3 / 16)
+    assert np.hypot(*unstable.state) == pytest.approx(0.5, abs=1e-11)
+    assert np.hypot(*stable.state) == pytest.approx(math.sqrt(3) / 2, abs=1e-11)
+    assert unstable.multipliers[0].real == pytest.approx(math.exp(math.pi / 2), abs=1e-9)
+    assert stable.multipliers[1].real == pytest.approx(math.exp(-3 * math.pi / 2), abs=1e-11)
+
+
+def test_the_cycles_of_three_genes_lead_from_the_hopf_point_to_large_strengths() -> None:
+    """Hopf point (C), cycle at a = 200 (F)."""
+    rest = sc.equilibrium(repressilator(5.0).replace(initial={"m": 1, "p": 1}))
+    (hopf,) = sc.follow(rest, "a", to=10.0).points["Hopf"]
+    assert hopf.value == pytest.approx(7.393774506123546, abs=1e-11)
+    assert hopf.frequency == pytest.approx((math.sqrt(96) - 6) / (2 * math.sqrt(3)), abs=1e-12)
+    last = sc.follow(hopf, "a", to=200.0)[-1]
+    assert last.period == pytest.approx(9.440954865983308, abs=1e-11)
+    assert last.multipliers[1].real == pytest.approx(0.11661576173674, abs=1e-11)
