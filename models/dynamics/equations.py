@@ -618,13 +618,14 @@ def _check_links(eq: Equations) -> None:
                 f"links of all pairs: found {pairs.n} of {eq.n} nodes; expected all of them, of one kind, and an edge that is "
                 "a finite sum of products of target and source"
             )
+    existing = set(range(eq.n))
     for layer in eq.listed:
         seen = set()
         if any(bool(edge.beyond) != bool(layer.beyond) for _, edge in layer.edge_of):
             raise ValueError("links of three ends: found a template of two ends, or a list without second sources")
         for target, source, _, *second in layer.each():
             nodes = (target, source, *second)
-            if not all(0 <= i < eq.n for i in nodes) or len(set(nodes)) < len(nodes):
+            if not existing.issuperset(nodes) or len(set(nodes)) < len(nodes):
                 raise ValueError(f"link {target} <- {source}: expected different nodes of 0 … {eq.n - 1}")
             if nodes in seen:
                 raise ValueError(f"link {target} <- {source} occurs twice; add the weights up")
