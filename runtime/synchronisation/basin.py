@@ -458,14 +458,14 @@ def basin(
 
 
 def _without_grid(scene: Scene, starts: Starts) -> Scene:
-    """Return the scene with the axes of the answer: those of parameters."""
+    """Return the scene with the axes of the answer, those of parameters, and without sample times."""
     rest = [axis for axis in scene.axes if axis not in starts.grid]
     if scene.zipped and rest and starts.grid:
         raise ValueError(
             f"basin: found zipped axes of parameters and initial states, {rest[0].name} and {starts.grid[0].name}; "
             "expected either; sweep one of them by a second call"
         )
-    return scene.replace(axes=rest, zipped=scene.zipped and bool(rest))
+    return scene.replace(axes=rest, zipped=scene.zipped and bool(rest), t_eval=None)
 
 
 def _limits(scene: Scene, bound: float | Mapping[str, float] | None) -> dict[str, float]:
@@ -505,7 +505,7 @@ def _motion(
     def measure(atol: float | None) -> SynchronousMotion:
         # all oscillators start alike, so that one of them is integrated where the network allows
         start = {name: values[0] for name, values in scene.initial.items() if name not in scene.equations.modes}
-        unit = scene.replace(initial=start, transient=1.0, window=1.0, t_eval=None, atol=atol or scene.given["atol"])
+        unit = scene.replace(initial=start, transient=1.0, window=1.0, atol=atol or scene.given["atol"])
         reduction, equations = reduce_scene(unit.replace(record=("sync_error",))), scene.equations
         first, times = Planner(unit).rows(np.arange(1)), (partial.transient, partial.window)
         with Trials.of(reduction, execution) as trials:
