@@ -16,7 +16,6 @@ from synchain.runtime.bifurcation.kinds import BifurcationKind
 from synchain.runtime.bifurcation.periodic_result import PeriodicOrbit
 from synchain.runtime.bifurcation.phases import Phases
 from synchain.runtime.bifurcation.results import Bifurcation, Branch, Curve, CurvePoint, Diagram
-from synchain.runtime.bifurcation.skeleton import Skeleton
 from synchain.runtime.results.labelled import Labelled
 from synchain.runtime.stability.attractor import Attractor, Motion
 from synchain.runtime.stability.cluster_exponents import ClusterExponents
@@ -162,7 +161,6 @@ def every_kind() -> dict[str, Labelled]:
         curve(),
         branch(),
         Diagram((branch(), branch())),
-        Skeleton((branch(), branch())),
         basin(),
         Probe(
             PAIR,

@@ -284,6 +284,13 @@ class Cycles:
         if not self.speed / RESCALED < speed < self.speed * RESCALED:
             self._rescale(z)
         self._refer(z)
+        if not self.periods:
+            # Cycles are fixed at another phase now: move the tangent along them, which is no change of the cycle.
+            rates, count = self.flow.rates(self.values(z), self.states(z)), self.phase.size
+            size = float(np.linalg.norm(rates / self.scale))
+            ahead = tangent[:count].reshape(self.phase.shape)
+            share = float(np.sum(self.phase * ahead / self.scale)) / size if size > 0.0 else 0.0
+            tangent = np.append(ahead - share * rates, tangent[count:])
         return z, tangent / float(np.linalg.norm(self.weights * tangent))
 
     def _finer(self) -> int:
@@ -400,7 +407,8 @@ class Cycles:
             for propagator in image.propagators:
                 moved = propagator @ moved
             scaled = rates[-1] / self.scale
-            neutral = np.append(neutral, scaled @ (moved / self.scale) / (scaled @ scaled))
+            size = float(scaled @ scaled)  # 0 at the equilibrium where cycles are born
+            neutral = np.append(neutral, scaled @ (moved / self.scale) / size if size > 0.0 else 1.0)
         multipliers = np.concatenate([critical.values[along], neutral])
         gaps = image.states - np.roll(self.states(z), -1, axis=0)
         gaps[-1] -= self.turns + self.shifts @ z[self.phase.size : self.phase.size + self.shifts.shape[1]]

@@ -145,8 +145,10 @@ def bifurcations(problem: Problem, before: Point, after: Point, length: float) -
                 if min(map(abs, sides)) > CLEAR * critical.scale:
                     break
             kind = problem.kind(complex(critical.values[touching].real), sides[0] * sides[1] < 0.0)
-            fold = kind is BifurcationKind.FOLD
-            located.append((turn, Located(kind, step.at(turn) if fold else step.turning_point(turn), touching)))
+            point = step.at(turn)
+            if kind is not BifurcationKind.FOLD:  # a flat turn has no digits in either form: take the better one
+                point = min((point, step.turning_point(turn)), key=lambda each: abs(_nearest(each)))
+            located.append((turn, Located(kind, point, touching)))
     return [*_together(located, length)]
 
 

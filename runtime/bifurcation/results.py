@@ -12,6 +12,7 @@ import xarray as xr
 
 from synchain.models.inputs.checks import typed_repr
 from synchain.models.inputs.display import HasPlot
+from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.scenes.scene import Scene
 
 from ..results.labelled import Labelled, dataset, scene_text
@@ -254,21 +255,29 @@ class Branch(Drawable):
                 "their kinds",
             ),
         }
-        coordinates = {self.name: (("point",), self.values), "arclength": (("point",), self.lengths)}
-        states = np.array([each.state for each in self.solutions])
-        first = self.solutions[0]
+        first, states = self.solutions[0], np.array([each.state for each in self.solutions])
+        numbers: list[np.ndarray]
         if isinstance(first, Equilibrium):
-            columns = States.of(first.scene)
-            found["state"] = (("point", *STATE), columns.table(states), "state at rest")
+            kind, components = "eigenvalues", tuple(first.scene.equations.components)
             numbers = [each.eigenvalues for each in self.solutions if isinstance(each, Equilibrium)]
-            found["eigenvalues"] = (("point", "number"), numbers, "eigenvalues, the largest real part first")
-            labels = {"component": list(columns.components), "node": list(first.scene.topology.labels)}
-            return dataset(found, {**coordinates, **labels}, first.scene)
-        multipliers = [each.multipliers for each in self.orbits]
-        found["state"] = (("point", "component"), states, "state at the start of a period")
-        found["multipliers"] = (("point", "number"), multipliers, "Floquet multipliers")
-        coordinates["period"] = (("point",), np.array([each.period for each in self.orbits]))
-        return dataset(found, {**coordinates, "component": list(first.components)}, first.scene)
+        else:
+            kind, components = "multipliers", first.components
+            numbers = [each.multipliers for each in self.orbits]
+        shape = (len(self), len(components), first.scene.n)
+        # Nodes of several kinds leave gaps in the table of components and nodes.
+        table = states.reshape(shape) if states.size == np.prod(shape) else States.of(first.scene).table(states)
+        found["state"] = (("point", *STATE), table, "state at rest, or at the start of a period")
+        found[kind] = (("point", "number"), numbers, f"{kind}, the largest first")
+        coordinates = {
+            self.name: (("point",), self.values),
+            "arclength": (("point",), self.lengths),
+            "component": list(components),
+            "node": list(first.scene.topology.labels),
+            "number": np.arange(1, len(numbers[0]) + 1),
+        }
+        if self.orbits:
+            coordinates["period"] = (("point",), np.array([each.period for each in self.orbits]))
+        return dataset(found, coordinates, first.scene)
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
@@ -278,7 +287,8 @@ class Branch(Drawable):
         if isinstance(first, Equilibrium):
             rows = [("scene", scene_text(first.scene)), ("equilibria", f"{len(self.solutions)}, {stable}")]
         else:
-            rows = [("orbits", f"{len(self)} of {first.periods} drive periods, {stable} for one oscillator")]
+            of = "" if first.free else f" of {first.periods} drive periods"
+            rows = [("scene", scene_text(first.scene, (self.name,))), ("orbits", f"{len(self)}{of}, {stable}")]
         rows.append((self.name, range_text(self.values)))
         rows.append(("bifurcations", "; ".join(each.text for each in self.bifurcations) or "none"))
         if self.ends:
@@ -294,6 +304,8 @@ class Diagram(Drawable):
     ----------
     branches : tuple of Branch
         The branches.
+    searched : mapping of str to (float, float)
+        Range of initial values of each component in the search of `skeleton`.
 
     See Also
     --------
@@ -301,6 +313,7 @@ class Diagram(Drawable):
     """
 
     branches: tuple[Branch, ...]
+    searched: Mapping[str, tuple[float, float]] = FrozenDict()
 
     def __len__(self) -> int:
         return len(self.branches)
@@ -317,8 +330,11 @@ class Diagram(Drawable):
         parts = []
         for number, branch in enumerate(self.branches):
             part = branch.data.drop_dims("turn")
-            parts.append(part.assign_coords(branch=("point", np.full(len(branch), number))))
-        return xr.concat(parts, "point") if parts else xr.Dataset()
+            period = np.full(len(branch), np.nan) if "period" not in part.coords else part.coords["period"].values
+            part = part.assign_coords(branch=("point", np.full(len(branch), number)), period=("point", period))
+            parts.append(part)
+        # Equilibria have eigenvalues and cycles multipliers: gaps are filled with NaN.
+        return xr.concat(parts, "point", join="outer") if parts else xr.Dataset()
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
@@ -328,7 +344,8 @@ class Diagram(Drawable):
             kinds = Counter(str(each.kind) for each in branch.bifurcations)
             found = ", ".join(f"{n} {kind}" for kind, n in kinds.items()) or "no bifurcation"
             rows.append((f"branch {k}", f"{len(branch)} solutions, {branch.name} {range_text(branch.values)}, {found}"))
-        return tuple(rows) or (("branches", "none"),)
+        box = ", ".join(f"{name} from {low:.4g} to {high:.4g}" for name, (low, high) in self.searched.items())
+        return (*(rows or [("branches", "none")]), *((("starts", box),) if box else ()))
 
 
 def diagram(*branches: Branch | Diagram) -> Diagram:

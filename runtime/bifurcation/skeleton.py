@@ -1,24 +1,23 @@
-"""Find the skeleton of a bifurcation diagram: branches of periodic orbits of few periods, stable or not.
+"""Find the skeleton of a bifurcation diagram: branches of equilibria, or of periodic orbits of few periods.
 
-A chaotic motion comes close to every periodic orbit on its attractor again and again; a transient comes close to orbits
+Without a drive, equilibria are searched by deflation at some values of the parameter and followed, and the cycles that
+are born at their Hopf points are followed too.  With a drive, orbits of few periods are searched: a chaotic motion comes close to every periodic orbit on its attractor again and again; a transient comes close to orbits
 near the attractor. P is the stroboscopic map. States x with P^k(x) near x are therefore good starts for Newton's method
 (Auerbach et al.).
 
 1. At some values of the parameter, motions from many starts are followed, and states that nearly return are collected.
 2. Newton's method finds an orbit from each state; an orbit that is already on a branch is left out.
-3. Each new orbit is followed up and down, and at a fold the search goes on along the other sheet.
+3. Each new orbit is followed up and down, and through folds.
 
 Source: Auerbach, Cvitanovic, Eckmann, Gunaratne & Procaccia, Phys. Rev. Lett. 58, 2387 (1987).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from numbers import Integral
 
 import numpy as np
-import xarray as xr
 
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import check_integer, check_keys, check_number, check_table, short_repr
@@ -27,16 +26,18 @@ from synchain.models.scenes.defaults import TimeUnit
 from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.run_keywords import Given, chosen, with_numbers
-from ..results.labelled import Labelled, dataset
 from ..stability.orbits import OrbitProblem, driven_states, within
 from ..support.arrays import row
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .branches import checked_values, follow
+from .deflation import equilibria
+from .equilibrium import Equilibrium
 from .flow import TOLERANCE
 from .periodic import NEWTON, check_periods, periodic_orbit
 from .periodic_result import PeriodicOrbit, whole_turns
-from .results import Branch
+from .results import Branch, Diagram
+from .switching import SAME, permutations_of
 
 Range = tuple[float, float]
 """Ends of an interval."""
@@ -60,74 +61,6 @@ for
 one period (choices)."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class Skeleton(Labelled):
-    """Branches of periodic orbits; reads like a tuple of them.
-
-    Parameters
-    ----------
-    branches : tuple of Branch
-        Each rises in the parameter; sorted by the number of periods and the first value.
-    searched : mapping of str to (float, float)
-        Range of initial values of each component in the search.
-
-    See Also
-    --------
-    synchain.skeleton
-    """
-
-    branches: tuple[Branch, ...]
-    searched: Mapping[str, Range] = FrozenDict()
-
-    def __len__(self) -> int:
-        return len(self.branches)
-
-    def __iter__(self) -> Iterator[Branch]:
-        return iter(self.branches)
-
-    def __getitem__(self, index: int) -> Branch:
-        return self.branches[index]
-
-    @property
-    def data(self) -> xr.Dataset:
-        """All orbits of all branches as one row, with branch, periods and parameter as coordinates."""
-        rows = [
-            (number, value, orbit)
-            for number, branch in enumerate(self.branches)
-            for value, orbit in zip(branch.values, branch.orbits, strict=True)
-        ]
-        if not rows:
-            return dataset({}, {})
-        branch_numbers, values, orbits = zip(*rows, strict=True)
-        return dataset(
-            {
-                "state": (("orbit", "component"), [o.state for o in orbits], "state at the start of a period"),
-                "multipliers": (("orbit", "number"), [o.multipliers for o in orbits], "Floquet multipliers"),
-                "stable": (("orbit",), [o.stable for o in orbits], "whether all multipliers lie in the circle"),
-            },
-            {
-                self.branches[0].name: ("orbit", np.array(values)),
-                "branch": ("orbit", np.array(branch_numbers)),
-                "periods": ("orbit", np.array([o.periods for o in orbits])),
-                "component": list(orbits[0].components),
-            },
-            orbits[0].scene,
-        )
-
-    @property
-    def summary(self) -> tuple[tuple[str, str], ...]:
-        """One row for each branch, and the box in which orbits were searched."""
-        rows = tuple(
-            (
-                f"branch {k}",
-                ", ".join(f"{name} {text}" if name != "orbits" else text for name, text in branch.summary),
-            )
-            for k, branch in enumerate(self.branches, 1)
-        )
-        box = ", ".join(f"{name} from {low:.4g} to {high:.4g}" for name, (low, high) in self.searched.items())
-        return (*(rows or (("branches", "none"),)), *((("starts", box),) if box else ()))
-
-
 def skeleton(
     scene: Scene,
     name: str,
@@ -142,28 +75,29 @@ def skeleton(
     progress: Hook | None = None,
     parameters: Mapping[str, float] | None = None,
     **more: float,
-) -> Skeleton:
-    """Find the skeleton of a bifurcation diagram: its branches of periodic orbits.
+) -> Diagram:
+    """Find the skeleton of a bifurcation diagram: its branches, stable or not.
 
-    Orbits are found from near returns at some of the values, and followed up and down from there. An
-    orbit is left out if it repeats itself after fewer periods, or if it is already on a branch.
+    For a driven oscillator, orbits are found from near returns at some of the values, and followed up and down from
+    there. An orbit is left out if it repeats itself after fewer periods, or if it is already on a branch. For a network
+    without a drive, equilibria are found by deflation and followed, and so are the cycles that are born at Hopf points.
 
     Parameters
     ----------
     scene : Scene
-        Source of the driven oscillator.
+        Source of the driven oscillator, or a network without a drive.
     name : str
         Name of the parameter.
     values : array_like, shape (k,)
         Monotonic values of the parameter.
     periods : sequence of int
-        Numbers of drive periods of the orbits.
+        Numbers of drive periods of the orbits; without a drive not used.
     looks : int
         Number of values at which orbits are searched.
     ranges : mapping of str to (float, float), optional
         Components and the ends of the initial values between which motions are searched; other components start as the
         scene does. By default all components start in boxes of 1, 2, 4 … 32 times the extent of the motion from the
-        scene's own start, around it. `Skeleton.searched` holds the ranges that were searched.
+        scene's own start, around it. `Diagram.searched` holds the ranges that were searched.
     transient : float, optional
         Drive periods before the search; by default those of the scene if it was given any, else 20.
     seed : int, optional
@@ -179,14 +113,14 @@ def skeleton(
 
     Returns
     -------
-    Skeleton
-        The branches.
+    Diagram
+        The branches: equilibria before cycles, orbits by their periods.
 
     Raises
     ------
     ValueError
         If the parameter is unknown, the values are not monotonic, `looks` is less than one, a range is empty or of an
-        unknown component, and for an oscillator without a drive.
+        unknown component.
 
     See Also
     --------
@@ -210,24 +144,21 @@ def skeleton(
     given = Given(skeleton, parameters, more, NEWTON)
     if name in given.values:
         raise ValueError(f"skeleton: {name!r} takes its values one after the other; expected others")
-    scene = given.scene(scene, rtol=TOLERANCE).lone
+    scene = given.scene(scene, rtol=TOLERANCE)
     if not isinstance(looks, Integral) or looks < 1:
         raise ValueError(f"looks = {short_repr(looks)}; expected a whole number, at least 1")
     for each in periods:
         check_periods(each)
-    if not without_drive(scene.equations, scene.parameters).forced:
-        raise ValueError(
-            "skeleton: found an oscillator without a drive; expected one with a drive, whose periods count those of orbits; "
-            "periodic_orbit(scene) finds the cycle that attracts it at one value, equilibrium(scene) a state at rest"
-        )
-    box = None if ranges is None else _box(scene, ranges)
-    branches: list[Branch] = []
-    searched: list[np.ndarray] = []
-
     # Search at evenly spread values: the middles of `count` equal parts of the grid.
     count = min(looks, len(grid))
     looked_at = sorted({int((2 * j + 1) * len(grid) / (2 * count)) for j in range(count)})
     transient, seed = _transient(scene, transient), check_integer("seed", chosen(scene, "seed", seed, 0), 0)
+    if not without_drive(scene.equations, scene.parameters).forced:
+        return Diagram(tuple(_resting(scene, name, grid, [grid[k] for k in looked_at], seed, ranges)))
+    scene = scene.lone
+    box = None if ranges is None else _box(scene, ranges)
+    branches: list[Branch] = []
+    searched: list[np.ndarray] = []
     with Execution(1, None, show_progress, progress).reporter(len(looked_at), "value") as reporter:
         for k in reporter.each(looked_at):
             one = with_numbers(scene, {name: grid[k]})
@@ -239,10 +170,39 @@ def skeleton(
     # The box around all starts, by component.
     low, high = (of(np.concatenate(searched), axis=0).tolist() for of in (np.min, np.max))
     names = (component for component in scene.components if component not in scene.equations.modes)
-    return Skeleton(
+    return Diagram(
         tuple(sorted(branches, key=lambda branch: (branch.orbits[0].periods, branch.values[0]))),
         FrozenDict({component: (a, b) for component, a, b in zip(names, low, high, strict=True)}),
     )
+
+
+def _resting(
+    scene: Scene, name: str, grid: list[float], values: list[float], seed: int, ranges: Mapping[str, Range] | None
+) -> list[Branch]:
+    """Return the branches of equilibria found at some values, and of the cycles born at their Hopf points."""
+    branches: list[Branch] = []
+    for value in values:
+        for rest in equilibria(with_numbers(scene, {name: value}), rng=seed, ranges=ranges):
+            known = (
+                branch[int(k)].state[each]
+                for branch in branches
+                for k in np.flatnonzero(branch.values == value)
+                for each in permutations_of(scene)
+            )
+            scale = float(np.abs(rest.state).max()) or 1.0
+            if not any(np.abs(rest.state - state).max() < SAME * scale for state in known):
+                branches.append(follow(rest, name, values=grid) if len(grid) > 1 else _single(name, rest))
+    cycles: list[Branch] = []
+    for point in [point for branch in branches for point in branch.points["Hopf"]]:
+        ends = (each.value for branch in cycles for each in branch.points["Hopf"])
+        if any(abs(end - point.value) < SAME * (grid[-1] - grid[0]) for end in ends):
+            continue  # a branch of cycles that is known ends there
+        for vector in range(len(point.vectors)):
+            try:
+                cycles.append(follow(point, name, within=(grid[0], grid[-1]), vector=vector))
+            except ArithmeticError:
+                continue
+    return branches + cycles
 
 
 def _transient(scene: Scene, transient: float | None) -> float:
@@ -386,7 +346,7 @@ def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
     return alike and any(_same(orbit, branch.orbits[k]) for k in np.flatnonzero(branch.values == value))
 
 
-def _single(name: str, orbit: PeriodicOrbit) -> Branch:
-    """Return a branch of one orbit."""
-    value, growing = np.array([orbit.scene.parameters[name]]), np.array([orbit.growing])
-    return Branch(name, value, (orbit,), (), growing, np.zeros(1))
+def _single(name: str, solution: Equilibrium | PeriodicOrbit) -> Branch:
+    """Return a branch of one solution."""
+    value, growing = np.array([solution.scene.parameters[name]]), np.array([solution.growing])
+    return Branch(name, value, (solution,), (), growing, np.zeros(1))

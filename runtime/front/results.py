@@ -25,7 +25,6 @@ HOMES = {
     "Probe": "runtime.synchronisation.probe",
     "Progress": "runtime.support.progress",
     "Result": "runtime.results.result",
-    "Skeleton": "runtime.bifurcation.skeleton",
     "Status": "runtime.support.status",
     "Streamed": "runtime.sweeps.stream",
     "SweepFailed": "runtime.sweeps.errors",

@@ -5,7 +5,6 @@ from synchain.runtime.bifurcation.results import Bifurcation as Bifurcation
 from synchain.runtime.bifurcation.results import Branch as Branch
 from synchain.runtime.bifurcation.results import Curve as Curve
 from synchain.runtime.bifurcation.results import Diagram as Diagram
-from synchain.runtime.bifurcation.skeleton import Skeleton as Skeleton
 from synchain.runtime.results.result import Result as Result
 from synchain.runtime.stability.cluster_exponents import ClusterExponents as ClusterExponents
 from synchain.runtime.stability.exponents import Exponents as Exponents

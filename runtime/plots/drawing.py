@@ -16,7 +16,6 @@ from synchain.models.spectra.spectrum import Spectrum
 from ..bifurcation.equilibrium import Equilibrium
 from ..bifurcation.periodic_result import PeriodicOrbit
 from ..bifurcation.results import Bifurcation, Branch, Curve, Diagram
-from ..bifurcation.skeleton import Skeleton
 from ..results.result import Result
 from ..stability.cluster_exponents import BlockVerdict, ClusterExponents
 from ..stability.exponents import Exponents
@@ -221,11 +220,6 @@ def _(value: Branch, axes: Axes, y: str | None = None, **style: Any) -> Axes:
 @_draw.register
 def _(value: Diagram, axes: Axes, y: str | None = None, **style: Any) -> Axes:
     return draw_branches(axes, value.branches, y, style)
-
-
-@_draw.register
-def _(value: Skeleton, axes: Axes, **style: Any) -> Axes:
-    return draw_branches(axes, value.branches, None, style)
 
 
 @_draw.register

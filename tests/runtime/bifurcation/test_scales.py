@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -111,12 +112,22 @@ def test_motions_that_escape_are_left_and_those_that_stay_are_found() -> None:
             call()
 
 
-def test_an_undriven_oscillator_is_told_what_is_possible() -> None:
-    lone = sc.Scene(sc.Field({"x": "v", "v": "(1 - x**2)*v - x*q"}, parameters={"q": 1}), None, None)
-    with pytest.raises(
-        ValueError, match=r"skeleton: found an oscillator without a drive; .*periodic_orbit\(scene\) finds the cycle"
-    ):
-        sc.skeleton(lone, "q", [1.0, 1.1])
+def test_the_skeleton_of_an_undriven_network_has_equilibria_and_cycles(tmp_path: Path) -> None:
+    """Two Brusselators: the uniform state, the pattern born at B = 4.2, and the cycles born at B = 5."""
+    node = sc.Field({"x": "2 - (B + 1)*x + x**2*y", "y": "B*x - x**2*y"}, parameters={"B": 3})
+    link = sc.Rates({"x": "W*(x_j - x_i)/5", "y": "W*(y_j - y_i)"})
+    scene = sc.Scene(node, link, sc.graphs.chain(2), initial={"x": 2, "y": 1.5})
+    found = sc.skeleton(scene, "B", [3.0, 4.0, 5.2], looks=3)
+    resting = [branch for branch in found if not branch.orbits]
+    cycles = [branch for branch in found if branch.orbits]
+    uniform, pattern = resting
+    assert [each.value for each in uniform.bifurcations] == pytest.approx([4.2, 5.0], abs=1e-11)
+    assert pattern.points["branch point"][0].value == pytest.approx(4.2, abs=1e-10)
+    assert cycles[0].values[0] == pytest.approx(5.0, abs=1e-11)
+    assert max(abs(cycles[0].values[-1] - 5.2), cycles[0][-1].residual) < 1e-9
+    found.save(tmp_path / "found.nc")
+    assert len(sc.open_result(tmp_path / "found.nc")) == len(found)
+    found.plot()
 
 
 def test_lines_of_a_branch_end_at_its_bifurcations_and_are_of_one_stability(

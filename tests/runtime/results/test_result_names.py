@@ -11,7 +11,7 @@ from synchain.codegen.driver.columns import SpanColumn
 from synchain.draw import normal
 from synchain.graphs import chain
 from synchain.models.inputs.names import ATTRIBUTES, TAKEN
-from synchain.results import PeriodicOrbit, Result, Skeleton
+from synchain.results import PeriodicOrbit, Result
 from synchain.runtime.bifurcation import results
 from synchain.runtime.bifurcation.kinds import BifurcationKind
 from synchain.runtime.bifurcation.results import Bifurcation
@@ -57,7 +57,7 @@ def test_no_plane_and_no_branch_has_other_names() -> None:
         np.zeros(1, int), np.zeros(1),
     )  # fmt: skip
     assert own(branch.data) - TAKEN - {"b"} <= results.NAMES
-    assert own(Skeleton((branch,)).data) - TAKEN - {"b"} <= results.NAMES
+    assert own(results.Diagram((branch,)).data) - TAKEN - {"b"} <= results.NAMES
 
 
 def test_they_are_refused_before_anything_runs() -> None:
