@@ -34,7 +34,7 @@ CHANGES: tuple[tuple[str, dict[str, float | int]], ...] = (
     ("zero-error threshold 1e-6", {"tolerance": 1e-6}),
     ("zero-error threshold 1e-2", {"tolerance": 1e-2}),
     ("one start, the stated one", {"starts": 1}),
-    ("other starts", {"seed": 1}),
+    ("other starts", {"rng": 1}),
     ("rtol 1e-6", {"rtol": 1e-6}),
     ("rtol 1e-10", {"rtol": 1e-10}),
 )

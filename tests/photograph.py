@@ -331,7 +331,7 @@ def _() -> Quantities:
 
 @scene("friction pair, random starts")
 def _() -> Quantities:
-    return simulated(pair(initial={"x": {"low": -0.4, "high": 0.4, "seed": 7}, "v": [0.1, -0.1]}), sigma=[0.1, 0.2])
+    return simulated(pair(initial={"x": {"low": -0.4, "high": 0.4, "rng": 7}, "v": [0.1, -0.1]}), sigma=[0.1, 0.2])
 
 
 @scene("friction pair, folded drive and coupling", long=True)

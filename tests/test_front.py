@@ -169,7 +169,7 @@ topology("circulant", 6, offsets=(1, 3))
 topology("own.py", 6, whatever=2)
 circulant(6, offset=(1, 3))  # wrong
 path(4, seed=1)  # wrong
-msf(Scene(), [0.0, 1.0], seed="a")  # wrong
+msf(Scene(), [0.0, 1.0], rng="a")  # wrong
 run(Scene(), parameters={"omega": 1.2}, executer=3, workers="two")  # wrong
 reveal_type(topology("grid", 6, shape=(2, 3)))
 """

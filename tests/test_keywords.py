@@ -27,7 +27,7 @@ SHARED = {
     "show_progress": None,
     "progress": None,
     "parameters": None,
-    "seed": None,
+    "rng": None,
     "precision": 1e-3,
     "periods": 5000,
     "transient": None,
@@ -36,11 +36,11 @@ SHARED = {
 """The defaults wherever a function has the keyword."""
 
 CELLS = {"workers", "executor", "show_progress", "progress", "parameters"}
-ORBITS = {"workers", "show_progress", "progress", "parameters", "seed", "precision", "periods", "transient", "rtol"}
+ORBITS = {"workers", "show_progress", "progress", "parameters", "rng", "precision", "periods", "transient", "rtol"}
 TAKEN = {
-    "run": CELLS,
-    "stream": CELLS,
-    "basin": CELLS | {"transient"},
+    "run": CELLS | {"rng"},
+    "stream": CELLS | {"rng"},
+    "basin": CELLS | {"transient", "rng"},
     "thresholds": CELLS | {"precision", "periods"},
     "universal_probe": CELLS,
     "exponents": ORBITS,
@@ -51,10 +51,10 @@ TAKEN = {
     "critical": ORBITS,
     "cluster_exponents": ORBITS - {"workers"},
     "lyapunov_spectrum": ORBITS - {"workers"},
-    "equilibria": {"parameters"},
+    "equilibria": {"parameters", "rng"},
     "equilibrium": {"parameters"},
     "periodic_orbit": {"parameters", "periods"},
-    "skeleton": {"show_progress", "progress", "parameters", "seed", "transient", "periods"},
+    "skeleton": {"show_progress", "progress", "parameters", "rng", "transient", "periods"},
 }
 """What each function that computes takes of the shared keywords."""
 
@@ -144,7 +144,7 @@ def test_every_function_refuses_in_one_line_what_is_no_parameter(name: str, tmp_
         *(
             (n, w, rf"Criterion\({w}=…\)")
             for n in ("thresholds", "universal_probe")
-            for w in ("rtol", "seed", "transient")
+            for w in ("rtol", "rng", "transient")
         ),
     ],
 )
@@ -242,7 +242,7 @@ def test_an_axis_of_the_strength_is_refused_where_something_depends_on_it(tmp_pa
 
 
 COLLIDING = (
-    "seed",
+    "rng",
     "rtol",
     "periods",
     "transient",
@@ -276,7 +276,7 @@ def test_parameters_with_the_names_of_keywords_go_into_the_mapping(name: str) ->
 
 def test_certificates_take_parameters_with_the_names_of_fields() -> None:
     scene = colliding().replace(record=("sync_error",))
-    result = synchain.run(scene, parameters={"seed": [1.0, 2.0]}, sigma=0.5, certified=True, show_progress=False)
+    result = synchain.run(scene, parameters={"rng": [1.0, 2.0]}, sigma=0.5, certified=True, show_progress=False)
     np.testing.assert_allclose(result.data["transversal_exponent"], [-2.0, -3.0], rtol=1e-9)
 
 
@@ -335,18 +335,18 @@ def test_seed_and_transient_of_a_skeleton_are_used(monkeypatch: pytest.MonkeyPat
     asked: list[tuple[str, float]] = []
     states, settled = skeletons.starts_of, skeletons.OrbitProblem.settled
     monkeypatch.setattr(
-        skeletons, "starts_of", lambda s, seed, box: asked.append(("seed", seed)) or states(s, seed, box)
+        skeletons, "starts_of", lambda s, seed, box: asked.append(("rng", seed)) or states(s, seed, box)
     )
     monkeypatch.setattr(
         skeletons.OrbitProblem,
         "settled",
         lambda problem, starts, length: asked.append(("transient", length)) or settled(problem, starts, length),
     )
-    synchain.skeleton(DRIVEN, "omega", [1.3], (1,), 1, transient=7, seed=3, show_progress=False)
-    assert asked == [("seed", 3), ("transient", 7.0)]
+    synchain.skeleton(DRIVEN, "omega", [1.3], (1,), 1, transient=7, rng=3, show_progress=False)
+    assert asked == [("rng", 3), ("transient", 7.0)]
 
 
-FIELDS: dict[str, Any] = {"rtol": 1e-5, "transient": 3.0, "window": 2.5, "seed": 3}
+FIELDS: dict[str, Any] = {"rtol": 1e-5, "transient": 3.0, "window": 2.5, "rng": 3}
 OPEN = Criterion(starts=2, tolerance=1.0, reach=0.1)
 SIMULATIONS = {
     "basin": lambda scene: synchain.basin(scene, samples=2, ranges={"x": (-1.0, 1.0)}, show_progress=False),
@@ -386,7 +386,7 @@ RECORDED: dict[str, Any] = {
     "section": "v_1 rising",
     "sections": {"passed": {"function": "x_1"}},
 }
-SWEPT = {"axes", "zipped", "continuation", "realisations", "draws", "rng"}
+SWEPT = {"axes", "zipped", "continuation", "realisations", "draws"}
 MODEL = {"oscillator", "coupling", "topology", "friction", "contact", "nodes", "links", "parameters"}
 ANSWERS: dict[str, Callable[[Any], tuple[Any, ...]]] = {
     "basin": lambda found: (found.error, found.status),
@@ -426,7 +426,7 @@ GIVEN: dict[str, Any] = {
     "rtol": 1e-5,
     "atol": 1e-3,
     "transient": 40.0,
-    "seed": 3,
+    "rng": 3,
     "max_steps": 3,
     "integrator": "rodas5p",
     "time_unit": "time",
@@ -446,9 +446,9 @@ def test_averages_obey_what_a_scene_was_given(name: str, field: str) -> None:
 
     changed = answer(ROSSLER.replace(**{field: GIVEN[field]}))
     assert changed != answer(ROSSLER)
-    if field in ("rtol", "seed"):  # a keyword says the same, and beats the scene
+    if field in ("rtol", "rng"):  # a keyword says the same, and beats the scene
         assert answer(ROSSLER, **{field: GIVEN[field]}) == changed
-        assert answer(ROSSLER.replace(**{field: 7 if field == "seed" else 1e-7}), **{field: GIVEN[field]}) == changed
+        assert answer(ROSSLER.replace(**{field: 7 if field == "rng" else 1e-7}), **{field: GIVEN[field]}) == changed
 
 
 def test_the_transient_of_a_scene_counts_in_its_own_unit() -> None:
@@ -472,19 +472,19 @@ def test_defaults_of_functions_hold_where_a_scene_was_given_nothing(monkeypatch:
     heard: list[Progress] = []
     found = synchain.exponents(plain, [0.1], progress=heard.append, **words)
     assert heard[0].total == 301
-    same = synchain.exponents(plain, [0.1], transient=300, rtol=1e-6, seed=0, **words)
+    same = synchain.exponents(plain, [0.1], transient=300, rtol=1e-6, rng=0, **words)
     np.testing.assert_array_equal(found.exponent, same.exponent)
 
 
 def test_skeletons_obey_the_transient_and_the_seed_of_a_scene(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[float] = []
-    monkeypatch.setattr(skeletons, "starts_of", lambda scene, seed, box: asked.append(seed) or np.zeros((1, 2)))
+    monkeypatch.setattr(skeletons, "starts_of", lambda scene, rng, box: asked.append(rng) or np.zeros((1, 2)))
     monkeypatch.setattr(
         skeletons, "near_returns", lambda scene, periods, transient, states: asked.append(transient) or []
     )
     for changes, expected in (
         ({}, [0, 20.0]),
-        ({"transient": 7.0, "seed": 3}, [3, 7.0]),
+        ({"transient": 7.0, "rng": 3}, [3, 7.0]),
         ({"transient": 300.0}, [0, skeletons.DROPPED]),
         ({"transient": 10.0, "time_unit": "time"}, [0, 10.0 / (2 * np.pi / 1.3)]),
     ):

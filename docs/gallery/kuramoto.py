@@ -28,7 +28,7 @@ scene = sc.Scene(
     phase,
     sine,
     sc.graphs.weighted(sc.graphs.complete(n), f"1/{n}"),
-    initial={"theta": {"low": 0, "high": 6.283, "seed": 1}},
+    initial={"theta": {"low": 0, "high": 6.283, "rng": 1}},
     record=(),
     observe={"r": sc.observe.mean(abs(sc.observe.nodes.mean(sp.exp(sp.I * theta))))},
     transient=20,

@@ -219,3 +219,8 @@ def check_path(what: str, value: object) -> Path:
     if not os.fspath(value).strip() or "\0" in os.fspath(value):
         raise ValueError(f"{what}: found {short_repr(os.fspath(value))}; expected the name of a file")
     return Path(value)
+
+
+def check_seed(what: str, rng: object, high: int = 2**63 - 1) -> int:
+    """Return the seed of random numbers: a whole number, or one drawn from a NumPy Generator (SPEC 7)."""
+    return int(rng.integers(high)) if hasattr(rng, "integers") else check_integer(what, rng, 0, high)

@@ -13,7 +13,7 @@ from typing import Any
 import sympy as sp
 
 from ..dynamics.record import Record
-from ..inputs.checks import check_choice, check_integer, check_number, check_text, is_row, short_repr
+from ..inputs.checks import check_choice, check_integer, check_number, check_seed, check_text, is_row, short_repr
 from ..inputs.entry_points import announced
 from ..inputs.frozen import FrozenDict
 from ..inputs.words import Word
@@ -49,7 +49,6 @@ LIMITS: Mapping[str, tuple[Any, Any]] = {
     "atol": (0.0, 0.1),
     "max_steps": (1, 10**12),
     "samples": (0, 10**8),
-    "seed": (0, SEED_LIMIT),
     "realisations": (0, LIMIT),
     "rng": (0, SEED_LIMIT),
 }
@@ -76,10 +75,9 @@ def complete(keywords: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of all keywords of a scene, together with the model."""
     values = dict(keywords)
     values["title"] = check_text("title", keywords["title"])
-    values["seed"] = check_integer("seed", keywords["seed"], *LIMITS["seed"])
+    values["rng"] = check_seed("rng", keywords["rng"], LIMITS["rng"][1])
     # Build the model, on the union of drawn graphs.
     values["draws"] = draws(keywords["draws"], keywords["realisations"])
-    values["rng"] = check_integer("rng", keywords["rng"], *LIMITS["rng"])
     values |= _model(keywords, values["draws"], values["rng"])
     model: Model = values["model"]
     # Axes, draws and parameters. A parameter has a value for each node or link if a single one is swept or drawn.
@@ -93,7 +91,7 @@ def complete(keywords: Mapping[str, Any]) -> dict[str, Any]:
     if GRAPH in values["draws"]:
         _check_graphs(model, differing)
     # Start, records and times.
-    values["initial"] = _start(model, keywords["initial"], values["seed"])
+    values["initial"] = _start(model, keywords["initial"], values["rng"])
     values["t_eval"] = _sample_times(keywords["t_eval"])
     values["record"] = _records(model, keywords["record"], bool(values["t_eval"]))
     values["section"] = _section(model, keywords["section"])
@@ -172,7 +170,7 @@ def check_physics(model: Model, parameter_values: Mapping[str, float], axes: Seq
                 check_power(kind.friction, at_node)
 
 
-def _start(model: Model, initial: object, seed: int) -> FrozenDict[tuple[float, ...]]:
+def _start(model: Model, initial: object, rng: int) -> FrozenDict[tuple[float, ...]]:
     """Return the initial states by component; by default around the initial state of each kind of node."""
     for name in model.components:
         base, _, number = name.rpartition("_")
@@ -186,7 +184,7 @@ def _start(model: Model, initial: object, seed: int) -> FrozenDict[tuple[float, 
     defaults = {
         name: tuple(by_kind[model.kind_of[i]][name][i] for i in network.holders(name)) for name in model.components
     }
-    return chosen_start(initial, defaults, seed)
+    return chosen_start(initial, defaults, rng)
 
 
 def _records(model: Model, record: object, sampled: bool) -> tuple[Record, ...]:

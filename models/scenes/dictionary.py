@@ -162,7 +162,7 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
     written["sections"] = {name: section.as_table() for name, section in values["sections"].items()}
     written["draws"] = {name: _draw(drawn) for name, drawn in values["draws"].items()}
     if not written["draws"]:
-        del written["rng"], written["realisations"]
+        del written["realisations"]
     for name in ("observe", "sections", "stop", "draws"):
         if not written[name]:
             del written[name]

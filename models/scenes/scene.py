@@ -73,7 +73,7 @@ class Scene(HasDrawing, HasLatex):
         Values of parameters: a number, or a list with one number for each node (for each edge or link, if the parameter
         belongs to the coupling).
     initial : mapping, optional
-        Initial states: a number, one number for each node, or {low, high, seed} for random ones.
+        Initial states: a number, one number for each node, or {low, high, rng} for random ones.
     record : iterable of str, optional
         Records of each cell: "sync_error", "section", "trajectory".
     observe : mapping of str to Observable or str, optional
@@ -111,16 +111,14 @@ class Scene(HasDrawing, HasLatex):
     continuation : str
         "up" or "down" if each cell starts from the final state of its neighbour along the last axis (of the scene or of
         a run), else "none".
-    seed : int
-        Seed of random initial states.
     realisations : int
         Number of realisations of the draws, a further dimension of the sweep; 0 for no draws.
     draws : mapping, optional
         Random numbers by the name of a parameter or initial state, or by "W" for the weights of links: `normal`,
         `uniform`, `lorentzian` (drawn for each node or edge separately), or a list with one entry for each realisation.
         The name "topology" draws graphs: a list of graphs, or a random graph as text, "erdos_renyi(20, p=0.3)".
-    rng : int
-        Seed of the draws.
+    rng : int or Generator
+        Seed of random initial states and of the draws, or a NumPy Generator that gives it.
 
     Attributes
     ----------
@@ -177,7 +175,6 @@ class Scene(HasDrawing, HasLatex):
     axes: tuple[Axis, ...]
     zipped: bool
     continuation: Continuation
-    seed: int
     realisations: int
     draws: FrozenDict[Draws]
     rng: int
@@ -214,10 +211,9 @@ class Scene(HasDrawing, HasLatex):
         axes: Iterable[Axis] | Mapping[str, object] = (),
         zipped: bool = False,
         continuation: str = "none",
-        seed: int = 0,
         realisations: int = 0,
         draws: Mapping[str, object] | None = None,
-        rng: int = 0,
+        rng: object = 0,
     ) -> None:
         keywords = {name: value for name, value in locals().items() if name != "self"}
         values = complete(keywords)
@@ -328,7 +324,7 @@ class Scene(HasDrawing, HasLatex):
             "rtol",
             "atol",
             "max_steps",
-            "seed",
+            "rng",
         ]
         return Scene(
             self.model.kinds[kind].oscillator,

@@ -73,7 +73,7 @@ def _rows() -> dict[str, Table]:
     """Return the rows of keywords that the type of the keyword does not determine."""
     oscillator, friction = _written_out()
     group = {"oscillator": oscillator, "friction": friction, "at": {"type": "array", "items": WHOLE, "minItems": 1}}
-    uniform = {"low": NUMBER, "high": NUMBER, "seed": _of_type("seed", int)}
+    uniform = {"low": NUMBER, "high": NUMBER, "rng": _of_type("rng", int)}
     span = {"from": NUMBER, "to": NUMBER, "count": {"type": "integer", "minimum": 1, "maximum": AXIS_LIMIT}}
     numbers = {"type": "array", "items": NUMBER, "minItems": 1}
     values = _either(numbers, {"type": "array", "items": numbers, "minItems": 1})

@@ -40,39 +40,39 @@ def default_start(
     }
 
 
-def chosen_start(value: object, defaults: Mapping[str, tuple[float, ...]], seed: int) -> FrozenDict[tuple[float, ...]]:
+def chosen_start(value: object, defaults: Mapping[str, tuple[float, ...]], rng: int) -> FrozenDict[tuple[float, ...]]:
     """Return {component: floats} from a table of some or all components; other components are taken from `defaults`."""
     table = check_table("initial", {} if value is None else value)
     check_keys("initial", table, tuple(defaults))
     states = dict(defaults)
     for name, values in defaults.items():
         if name in table:
-            states[name] = _component(f"initial {name}", table[name], name, len(values), seed)
+            states[name] = _component(f"initial {name}", table[name], name, len(values), rng)
     return FrozenDict(states)
 
 
-def _component(what: str, value: object, name: str, n: int, seed: int) -> tuple[float, ...]:
+def _component(what: str, value: object, name: str, n: int, rng: int) -> tuple[float, ...]:
     """Return the states of one component from a random range, one number for all nodes, or one number for each."""
     if isinstance(value, Mapping):
-        check_keys(what, value, ("low", "high", "seed"))
+        check_keys(what, value, ("low", "high", "rng"))
         for key in ("low", "high"):
             if key not in value:
                 raise ValueError(
-                    f"{what}: {key!r} is missing in {short_repr(dict(value))}; expected {{low, high}} or {{low, high, seed}}"
+                    f"{what}: {key!r} is missing in {short_repr(dict(value))}; expected {{low, high}} or {{low, high, rng}}"
                 )
         low, high = check_number(f"{what}: low", value["low"]), check_number(f"{what}: high", value["high"])
         if low > high:
             raise ValueError(f"{what}: low = {low!r} is above high = {high!r}; expected low <= high; swap them")
-        if "seed" in value:
-            seed = check_integer(f"{what}: seed", value["seed"], 0, SEED_LIMIT)
-        stream = random.Random(f"{seed} {name}")  # one for each component: x and v of one seed are independent
+        if "rng" in value:
+            rng = check_integer(f"{what}: rng", value["rng"], 0, SEED_LIMIT)
+        stream = random.Random(f"{rng} {name}")  # one for each component: x and v of one seed are independent
         shares = (stream.random() for _ in range(n))
         return tuple((1.0 - share) * low + share * high for share in shares)
     listed = value.tolist() if hasattr(value, "tolist") else value
     if not is_row(listed):
         return (check_number(what, listed),) * n
     if isinstance(listed, (set, frozenset)):
-        raise TypeError(f"{what}: found {short_repr(listed)}; expected a number, {n} numbers or {{low, high, seed}}")
+        raise TypeError(f"{what}: found {short_repr(listed)}; expected a number, {n} numbers or {{low, high, rng}}")
     listed, count = first_of(listed, n)
     if len(listed) != n:
         raise ValueError(f"{what}: found {count} values for {n} oscillators; expected {n} values or one number for all")

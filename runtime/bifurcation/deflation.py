@@ -16,7 +16,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from synchain.models.dynamics.angles import periods_of_kinds
-from synchain.models.inputs.checks import check_integer, check_keys, check_table, short_repr
+from synchain.models.inputs.checks import check_integer, check_keys, check_seed, check_table, short_repr
 from synchain.models.scenes.scene import Scene
 
 from ..cells.run_keywords import Given
@@ -90,8 +90,8 @@ class Known:
 def equilibria(
     scene: Scene,
     count: int = 20,
-    rng: int = 0,
     *,
+    rng: int | np.random.Generator | None = None,
     ranges: Mapping[str, tuple[float, float]] | None = None,
     parameters: Mapping[str, float] | None = None,
     **more: float,
@@ -107,8 +107,8 @@ def equilibria(
         Network.
     count : int
         Most equilibria.
-    rng : int
-        Seed of the random starts.
+    rng : int or Generator, optional
+        Seed of the random starts, or a NumPy Generator that gives it; by default that of the scene.
     ranges : mapping of str to (float, float), optional
         Components and the ends of their random starts.  By default angles start anywhere, other components within 1, 2, 4
         and 8 times their largest initial state.
@@ -144,11 +144,11 @@ def equilibria(
     >>> len(found), sum(each.stable for each in found)
     (6, 3)
     """
-    count, rng = check_integer("count", count, 1), check_integer("rng", rng, 0)
+    count, seed = check_integer("count", count, 1), check_seed("rng", scene.rng if rng is None else rng)
     scene = Given(equilibria, parameters, more, REFUSED).scene(scene)
     network, first = Linearised.of(resting_equations("equilibria", scene), scene.parameters), np.array(scene.y0)
     names, shifts = shifted_components(scene, network, first)
-    starts, scales = _starts(scene, rng, ranges)
+    starts, scales = _starts(scene, seed, ranges)
     known = Known(scene, shifts, scales)
     found: list[Equilibrium] = []
     for start in (first, *starts):
@@ -169,7 +169,7 @@ def equilibria(
     return tuple(found)
 
 
-def _starts(scene: Scene, rng: int, ranges: Mapping[str, tuple[float, float]] | None) -> tuple[np.ndarray, np.ndarray]:
+def _starts(scene: Scene, seed: int, ranges: Mapping[str, tuple[float, float]] | None) -> tuple[np.ndarray, np.ndarray]:
     """Return random starts (STARTS, states), and the scale (states,) of each state."""
     states, first = States.of(scene), np.array(scene.y0)
     size = len(first)
@@ -192,7 +192,7 @@ def _starts(scene: Scene, rng: int, ranges: Mapping[str, tuple[float, float]] | 
         chosen = states.rows == states.components.index(name)
         low[:, chosen], high[:, chosen] = pair
         scales[chosen] = 0.5 * (pair[1] - pair[0])
-    share = np.random.default_rng(rng).uniform(size=(STARTS, size))
+    share = np.random.default_rng(seed).uniform(size=(STARTS, size))
     return low + (high - low) * share, scales
 
 

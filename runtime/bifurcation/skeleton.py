@@ -20,7 +20,7 @@ from numbers import Integral
 import numpy as np
 
 from synchain.models.dynamics.reduction import without_drive
-from synchain.models.inputs.checks import check_integer, check_keys, check_number, check_table, short_repr
+from synchain.models.inputs.checks import check_keys, check_number, check_seed, check_table, short_repr
 from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.scenes.defaults import TimeUnit
 from synchain.models.scenes.scene import Scene, check_scene
@@ -70,7 +70,7 @@ def skeleton(
     *,
     ranges: Mapping[str, Range] | None = None,
     transient: float | None = None,
-    seed: int | None = None,
+    rng: int | np.random.Generator | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
     parameters: Mapping[str, float] | None = None,
@@ -100,7 +100,7 @@ def skeleton(
         scene's own start, around it. `Diagram.searched` holds the ranges that were searched.
     transient : float, optional
         Drive periods before the search; by default those of the scene if it was given any, else 20.
-    seed : int, optional
+    rng : int or Generator, optional
         Seed of the initial states of the search; by default that of the scene.
     show_progress : bool, optional
         Whether to show a bar; by default a bar on terminals and in notebooks, a line a minute elsewhere.
@@ -152,7 +152,7 @@ def skeleton(
     # Search at evenly spread values: the middles of `count` equal parts of the grid.
     count = min(looks, len(grid))
     looked_at = sorted({int((2 * j + 1) * len(grid) / (2 * count)) for j in range(count)})
-    transient, seed = _transient(scene, transient), check_integer("seed", chosen(scene, "seed", seed, 0), 0)
+    transient, seed = _transient(scene, transient), check_seed("rng", chosen(scene, "rng", rng, 0))
     if not without_drive(scene.equations, scene.parameters).forced:
         return Diagram(tuple(_resting(scene, name, grid, [grid[k] for k in looked_at], seed, ranges)))
     scene = scene.lone

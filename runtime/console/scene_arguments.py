@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
     from ..results.labelled import Labelled
 
-SETTINGS = ("transient", "window", "samples", "rtol", "atol", "max_steps", "seed")
+SETTINGS = ("transient", "window", "samples", "rtol", "atol", "max_steps", "rng")
 """Numbers of a scene besides parameters and initial states that --set can change."""
 
-COUNTS = ("samples", "max_steps", "seed")
+COUNTS = ("samples", "max_steps", "rng")
 """Those of them that are whole numbers."""
 
 

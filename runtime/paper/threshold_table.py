@@ -194,7 +194,7 @@ def document(data: Comparison) -> str:
     c = data.quality.criterion
     criterion = (
         f"Criterion: sigma counts as synchronous where at least half of {c.starts} starts (the stated one and copies "
-        f"moved by up to {c.reach:g} in position, seed {c.seed}) end with an average synchronisation error below "
+        f"moved by up to {c.reach:g} in position, seed {c.rng}) end with an average synchronisation error below "
         f"{c.tolerance:g}, over {c.window:g} drive periods after a transient of {c.transient:g}, with rtol = {c.rtol:g}. "
         f"Ends are refined to {data.quality.resolution:g} in sigma."
     )

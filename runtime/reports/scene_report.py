@@ -141,7 +141,7 @@ def _provenance(scene: Scene) -> str:
         ("versions", versions()),
         ("equations", scene.equations.digest),
         ("kernel", kernel_source(scene).digest),
-        ("seed", str(scene.seed)),
+        ("seed", str(scene.rng)),
     ]
     text = json.dumps(scene.as_dict(), indent=1)
     return f"{rows_table(rows)}<details><summary>the scene</summary><pre>{escape(text)}</pre></details>"

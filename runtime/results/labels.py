@@ -335,7 +335,7 @@ def provenance(
         "equations": kernel.equations.digest,
         "kernel": kernel.digest,
         "lanes": kernel.origin.width,
-        "seed": scene.seed,
+        "rng": scene.rng,
         "versions": versions,
         "processor": processor,
         "skipped": "; ".join(skipped) or "nothing",

@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.special import ndtr, stdtrit
 
-from synchain.models.inputs.checks import check_integer, check_number, check_positive
+from synchain.models.inputs.checks import check_number, check_positive, check_seed
 from synchain.models.scenes.defaults import TimeUnit
 from synchain.models.scenes.scene import Scene
 
@@ -57,8 +57,8 @@ starts : int
 rtol : float, optional
     Relative tolerance of the integration; by default that of the scene if it was given one, else 1e-6. The friction law
     may require a smaller one.
-seed : int, optional
-    Seed of the displacements; by default that of the scene.
+rng : int or Generator, optional
+    Seed of the displacements, or a NumPy Generator that gives it; by default that of the scene.
 workers : int, optional
     Number of threads; all cores by default.
 """,
@@ -105,7 +105,7 @@ class Averaging:
         object.__setattr__(self, "precision", check_number("precision", self.precision, 0.0))
         object.__setattr__(self, "periods", check_whole("periods", check_positive("periods", self.periods)))
         object.__setattr__(self, "transient", check_whole("transient", check_number("transient", self.transient, 0.0)))
-        object.__setattr__(self, "seed", check_integer("seed", self.seed, 0))
+        object.__setattr__(self, "seed", check_seed("rng", self.seed))
 
     @classmethod
     def for_scene(
@@ -114,14 +114,14 @@ class Averaging:
         precision: float,
         periods: float,
         transient: float | None,
-        seed: int | None,
+        rng: int | np.random.Generator | None,
         execution: Execution,
     ) -> Averaging:
         """Return the averaging for the keywords of a public function.
 
-        If `transient` or `seed` is None, use the scene's.
+        If `transient` or `rng` is None, use the scene's.
         """
-        seed = chosen(scene, "seed", seed, 0)
+        seed = check_seed("rng", chosen(scene, "rng", rng, 0))
         length = chosen(scene, "transient", transient, None)
         if transient is not None:
             return cls(precision, periods, transient, seed, execution)

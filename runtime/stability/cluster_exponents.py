@@ -185,7 +185,7 @@ def cluster_exponents(
     periods: float = 5000,
     transient: float | None = None,
     rtol: float | None = None,
-    seed: int | None = None,
+    rng: int | np.random.Generator | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
     parameters: Mapping[str, float] | None = None,
@@ -204,7 +204,7 @@ def cluster_exponents(
     {average}
     rtol : float, optional
         Relative tolerance of the integration; by default that of the scene. The friction law may require a smaller one.
-    seed : int, optional
+    rng : int or Generator, optional
         Seed of the initial deviations; by default that of the scene.
     {progress}
     {parameters}
@@ -243,7 +243,7 @@ def cluster_exponents(
     (1,)
     """
     execution = Execution(1, None, show_progress, progress)
-    averaging = Averaging.for_scene(scene, precision, periods, transient, seed, execution)
+    averaging = Averaging.for_scene(scene, precision, periods, transient, rng, execution)
     given = Given(cluster_exponents, parameters, more, ONE_ORBIT)
     scene = given.scene(scene, rtol=scene.rtol if rtol is None else rtol)
     partition = _of_graph(scene, state)

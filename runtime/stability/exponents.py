@@ -325,7 +325,7 @@ def exponents(
     transient: float | None = None,
     starts: int = 4,
     rtol: float | None = None,
-    seed: int | None = None,
+    rng: int | np.random.Generator | None = None,
     workers: int | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
@@ -365,7 +365,7 @@ def exponents(
     Notes
     -----
     The scene provides the model, the parameters, the first initial state, `contact`, `integrator`, `atol` and
-    `max_steps`. It also provides `rtol`, `transient` and `seed`, if they differ from the defaults of a scene and the
+    `max_steps`. It also provides `rtol`, `transient` and `rng`, if they differ from the defaults of a scene and the
     call has no such keyword.
 
     Raises
@@ -386,7 +386,7 @@ def exponents(
     """
     given = Given(exponents, parameters, more, ORBITS)
     execution = Execution(workers, None, show_progress, progress)
-    averaging = Averaging.for_scene(scene, precision, periods, transient, seed, execution)
+    averaging = Averaging.for_scene(scene, precision, periods, transient, rng, execution)
     asked = numbers("alpha", alpha, complex_too=True)
     of_layers = asked.ndim == 2 and len(check_scene(scene).model.linked) > 1
     strengths = row_of("alpha", asked.ravel() if of_layers else asked, complex_too=True)

@@ -180,7 +180,7 @@ def lyapunov_spectrum(
     periods: float = 5000,
     transient: float | None = None,
     rtol: float | None = None,
-    seed: int | None = None,
+    rng: int | np.random.Generator | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
     parameters: Mapping[str, float] | None = None,
@@ -198,7 +198,7 @@ def lyapunov_spectrum(
     rtol : float, optional
         Relative tolerance of the integration, at most 1e-5; by default that of the scene. The friction law may require
         a smaller one.
-    seed : int, optional
+    rng : int or Generator, optional
         Seed of the initial directions; by default that of the scene.
     {progress}
     {parameters}
@@ -233,7 +233,7 @@ def lyapunov_spectrum(
     (-13.666667, True)
     """
     execution = Execution(1, None, show_progress, progress)
-    averaging = Averaging.for_scene(scene, precision, periods, transient, seed, execution)
+    averaging = Averaging.for_scene(scene, precision, periods, transient, rng, execution)
     given = Given(lyapunov_spectrum, parameters, more, ONE_ORBIT)
     scene = given.scene(scene, rtol=scene.rtol if rtol is None else rtol)
     reporter = averaging.reporter()

@@ -512,7 +512,7 @@ def msf(
     transient: float | None = None,
     starts: int = 4,
     rtol: float | None = None,
-    seed: int | None = None,
+    rng: int | np.random.Generator | None = None,
     workers: int | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
@@ -558,7 +558,7 @@ def msf(
     (0.0, 0.69)
     """
     averaging = Averaging.for_scene(
-        scene, precision, periods, transient, seed, Execution(workers, None, show_progress, progress)
+        scene, precision, periods, transient, rng, Execution(workers, None, show_progress, progress)
     )
     return on_a_line(Given(msf, parameters, more, ORBITS), scene, alpha, starts, rtol, averaging)
 
@@ -594,7 +594,7 @@ def plane(
     transient: float | None = None,
     starts: int = 4,
     rtol: float | None = None,
-    seed: int | None = None,
+    rng: int | np.random.Generator | None = None,
     workers: int | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
@@ -657,7 +657,7 @@ def plane(
     (3, 2)
     """
     execution = Execution(workers, None, show_progress, progress)
-    averaging = Averaging.for_scene(scene, precision, periods, transient, seed, execution)
+    averaging = Averaging.for_scene(scene, precision, periods, transient, rng, execution)
     call = Given(plane, parameters, more, ORBITS)
     call.checked(with_partner(scene))
     rows, fixed = call.parted()

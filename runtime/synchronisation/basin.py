@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from synchain.models.inputs.checks import check_integer, check_number, check_positive, check_table
+from synchain.models.inputs.checks import check_number, check_positive, check_seed, check_table
 from synchain.models.inputs.display import HasPlot
 from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.scenes.scene import Axis, Scene, check_scene
@@ -413,9 +413,7 @@ def basin(
         raise ValueError(
             "basin: found draws; expected a scene without them; write scene.replace(realisations=0, draws=None)"
         )
-    if isinstance(rng, np.random.Generator):
-        rng = int(rng.integers(2**63))
-    seed = scene.seed if rng is None else check_integer("basin: rng", rng, 0)
+    seed = scene.rng if rng is None else check_seed("basin: rng", rng)
     starts = Starts.of(scene, samples, ranges, nodes, seed)
     answer = _without_grid(scene, starts)
     known = Attractors.of(answer, attractors, (OTHER, *ENDS))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.inputs.checks import check_instance, check_integer, check_number, check_positive
+from synchain.models.inputs.checks import check_instance, check_integer, check_number, check_positive, check_seed
 from synchain.models.scenes.defaults import TimeUnit
 from synchain.models.scenes.scene import Scene
 
@@ -78,8 +78,10 @@ class Criterion:
         Transient and window in the scene's unit of time. By default those of the scene, if they differ from the
         defaults of `Scene`; otherwise 1000 and 100 periods of the drive or, without a drive, 1000 and 100 times the
         time in which the motion turns by a radian.
-    rtol, seed : float, int, optional
-        Relative tolerance and seed; by default those of the scene.
+    rtol : float, optional
+        Relative tolerance; by default that of the scene.
+    rng : int or Generator, optional
+        Seed of the starts, or a NumPy Generator that gives it; by default that of the scene.
 
     See Also
     --------
@@ -98,7 +100,7 @@ class Criterion:
     transient: float | None = None
     window: float | None = None
     rtol: float | None = None
-    seed: int | None = None
+    rng: int | np.random.Generator | None = None
 
     def __post_init__(self) -> None:
         for name in ("tolerance", "window", "rtol"):
@@ -108,8 +110,8 @@ class Criterion:
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, check_number(f"criterion: {name}", getattr(self, name), 0.0))
         check_integer("criterion: starts", self.starts, 1)
-        if self.seed is not None:
-            check_integer("criterion: seed", self.seed, 0)
+        if self.rng is not None:
+            object.__setattr__(self, "rng", check_seed("criterion: rng", self.rng))
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +124,7 @@ class AppliedCriterion(Criterion):
     transient: float
     window: float
     rtol: float
-    seed: int
+    rng: int
     extent: tuple[float, ...]  # extent of the synchronous motion in each compared component
     relative: bool = (
         False  # True if the tolerance follows from the extent; the error of each component is then tested too
@@ -170,8 +172,8 @@ def checked(criterion: Criterion | None) -> Criterion:
 
 
 def preset(criterion: Criterion, scene: Scene) -> Criterion:
-    """Return the criterion with the scene's times, rtol and seed in place of fields that are None."""
-    of_scene: dict[str, Any] = {"rtol": scene.rtol, "seed": scene.seed}
+    """Return the criterion with the scene's times, rtol and rng in place of fields that are None."""
+    of_scene: dict[str, Any] = {"rtol": scene.rtol, "rng": scene.rng}
     for name, periods in TIMES.items():
         value = getattr(scene, name)
         if value != inspect.signature(Scene).parameters[name].default:
@@ -243,5 +245,5 @@ def final_errors(end: np.ndarray, criterion: AppliedCriterion, equations: Equati
 
 def offsets(criterion: AppliedCriterion) -> np.ndarray:
     """Return the displacements (starts,): 0, followed by random numbers."""
-    random = np.random.default_rng(criterion.seed)
+    random = np.random.default_rng(criterion.rng)
     return np.concatenate([[0.0], random.uniform(-criterion.reach, criterion.reach, criterion.starts - 1)])

@@ -166,7 +166,7 @@ def critical(
     transient: float | None = None,
     starts: int = 4,
     rtol: float | None = None,
-    seed: int | None = None,
+    rng: int | np.random.Generator | None = None,
     workers: int | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
@@ -230,7 +230,7 @@ def critical(
     True
     """
     averaging = Averaging.for_scene(
-        scene, precision, periods, transient, seed, Execution(workers, None, show_progress, progress)
+        scene, precision, periods, transient, rng, Execution(workers, None, show_progress, progress)
     )
     call = Given(critical, parameters, more, ORBITS)
     call.checked(with_partner(scene))

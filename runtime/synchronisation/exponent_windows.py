@@ -92,7 +92,7 @@ def exponent_windows(
             alpha,
             precision=precision,
             periods=periods,
-            seed=seed,
+            rng=seed,
             workers=execution.workers,
             show_progress=execution.show_progress,
             progress=execution.progress,

@@ -22,7 +22,7 @@ import xarray as xr
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
-from synchain.models.inputs.checks import check_number, check_positive
+from synchain.models.inputs.checks import check_number, check_positive, check_seed
 from synchain.models.scenes.defaults import TimeUnit
 from synchain.models.scenes.scene import Scene, check_scene
 from synchain.models.spectra.spectrum import Spectrum
@@ -201,7 +201,7 @@ def thresholds(
         Width in sigma to which ends of ranges are refined; for the probe, twice this width in alpha. By default
         the larger of 5e-4 and a thousandth of sigma, but at most a fifth of the step of the grid.
     criterion : Criterion, optional
-        Conditions for synchronisation, with rtol, seed and transient of all cells. Fields that are None follow from the
+        Conditions for synchronisation, with rtol, rng and transient of all cells. Fields that are None follow from the
         scene and its motion.
     precision, periods : float
         Standard error and longest average of the exponents, as for `exponents`.
@@ -252,7 +252,9 @@ def thresholds(
     precision = check_number("precision", precision, 0.0)
     periods = check_whole("periods", check_positive("periods", periods))
     alpha = _probe_grid(grid, spectrum)
-    stable = exponent_windows(scene, alpha, execution, precision, periods, preset(criterion, scene).seed or 0)
+    stable = exponent_windows(
+        scene, alpha, execution, precision, periods, check_seed("rng", preset(criterion, scene).rng)
+    )
     used = fitted(_pair(scene), 0.5 * alpha, criterion, execution)
     pair = probe(scene, alpha, used, resolution, execution)
     direct = simulate(scene, grid, used, resolution, execution)

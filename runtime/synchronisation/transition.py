@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from synchain.models.graphs.topology import Topology
-from synchain.models.inputs.checks import check_number
+from synchain.models.inputs.checks import check_number, check_seed
 from synchain.models.scenes.scene import Scene, check_scene
 from synchain.models.spectra.eigenvalue import Eigenvalue
 from synchain.models.symmetries.mode_classes import mode_classes, together
@@ -210,7 +210,7 @@ class Transition(Labelled):
         precision: float = 1e-3,
         periods: float = 5000,
         transient: float | None = None,
-        seed: int | None = None,
+        rng: int | np.random.Generator | None = None,
         show_progress: bool | None = None,
         progress: Hook | None = None,
     ) -> TransitionCheck:
@@ -224,7 +224,7 @@ class Transition(Labelled):
         ----------
         apart : float
             Relative distance of both strengths from that of the step, between 0 and 1.
-        precision, periods, transient, seed
+        precision, periods, transient, rng
             Average of the exponents, as for `cluster_exponents`.
         show_progress, progress
             As for `cluster_exponents`, with one bar for each average.
@@ -248,7 +248,7 @@ class Transition(Labelled):
         """
         if not 0.0 < check_number("apart", apart) < 1.0:
             raise ValueError(f"apart: found {apart:g}; expected a number between 0 and 1")
-        scene, steps = _started_apart(self.scene, seed), self.steps
+        scene, steps = _started_apart(self.scene, rng), self.steps
         exponent, stderr = np.full((2, len(steps), 2), np.nan)
         strength = np.outer([step.strength for step in steps], [1.0 - apart, 1.0 + apart])
         remarks = []
@@ -266,7 +266,7 @@ class Transition(Labelled):
                     precision=precision,
                     periods=periods,
                     transient=transient,
-                    seed=seed,
+                    rng=rng,
                     show_progress=show_progress,
                     progress=progress,
                     parameters={scene.strength: float(strength[k, j])},
@@ -393,7 +393,7 @@ def transition(
     transient: float | None = None,
     starts: int = 4,
     rtol: float | None = None,
-    seed: int | None = None,
+    rng: int | np.random.Generator | None = None,
     workers: int | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
@@ -464,7 +464,7 @@ def transition(
         expect_no_repulsion(graph, eigenvalue.value)
     mode_classes(graph)  # ValueError for too many nodes
     averaging = Averaging.for_scene(
-        scene, precision, periods, transient, seed, Execution(workers, None, show_progress, progress)
+        scene, precision, periods, transient, rng, Execution(workers, None, show_progress, progress)
     )
     function = on_a_line(given, scene, alpha, starts, rtol, averaging)
     if not function.alpha[0] <= 0.0 < function.alpha[-1]:
@@ -507,9 +507,10 @@ def _imbalance(graph: Topology, classes: Sequence[int]) -> str:
     return ""
 
 
-def _started_apart(scene: Scene, seed: int | None) -> Scene:
+def _started_apart(scene: Scene, rng: int | np.random.Generator | None) -> Scene:
     """Return a scene whose nodes start at different states; a scene with different states stays unchanged."""
     if any(len(set(values)) > 1 for values in scene.initial.values()):
         return scene
-    states = initial_states(scene, scene.n, chosen(scene, "seed", seed, 0))
+    seed = check_seed("transition: rng", chosen(scene, "rng", rng, 0))
+    states = initial_states(scene, scene.n, seed)
     return scene.replace(initial={name: states[:, k].tolist() for k, name in enumerate(scene.initial)})

@@ -149,7 +149,7 @@ def pickled(scene: sc.Scene) -> sc.Scene:
 
 def replaced(scene: sc.Scene) -> sc.Scene:
     """Every field changed and changed back, one after the other."""
-    other = {"transient": 3.0, "window": 7.0, "rtol": 1e-5, "seed": 3, "integrator": "dop853", "title": "other"}
+    other = {"transient": 3.0, "window": 7.0, "rtol": 1e-5, "rng": 3, "integrator": "dop853", "title": "other"}
     changed = scene
     for name, value in other.items():
         changed = changed.replace(**{name: value})

@@ -34,7 +34,6 @@ OTHER: dict[str, Any] = {
     "atol": 1e-7,
     "max_steps": 1000,
     "axes": {"g": [0.1, 0.2]},
-    "seed": 3,
     "realisations": 2,
     "draws": {"x": "normal(0, 1)"},
     "rng": 5,
@@ -60,7 +59,7 @@ def test_fields_that_need_one_another_are_put_back_together(names: tuple[str, ..
     assert changed.replace(**{name: getattr(SCENE, name) for name in names}) == SCENE
 
 
-@pytest.mark.parametrize("value", [5.0, {"low": 1.0, "high": 2.0, "seed": 3}])
+@pytest.mark.parametrize("value", [5.0, {"low": 1.0, "high": 2.0, "rng": 3}])
 def test_numbers_and_ranges_of_any_number_of_nodes_stay(value: Any) -> None:
     scene = sc.Scene("duffing", topology=sc.graphs.chain(3), initial={"x": value})
     there = scene.replace(topology=sc.graphs.chain(4))
@@ -91,8 +90,4 @@ def test_a_scene_with_any_field_is_what_was_kept_of_it(name: str, keep: Any, tmp
     if name in ("samples", "record"):
         changes = {both: OTHER[both] for both in ("samples", "record")}
     scene = SCENE.replace(**changes)
-    if (keep[0], name) == ("file", "rng"):
-        request.applymarker(
-            pytest.mark.xfail(strict=True, reason="new: a file does not hold rng where nothing is drawn")
-        )
     assert keep[1](scene, tmp_path) == scene

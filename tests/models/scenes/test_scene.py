@@ -154,9 +154,9 @@ def test_random_starts_are_reproducible_and_independent() -> None:
     def drawn(**box: object) -> Scene:
         return Scene(topology=chain(6), initial={"x": box, "v": box})
 
-    first = drawn(low=-1, high=1, seed=3)
-    assert first == drawn(low=-1, high=1, seed=3)
-    assert first.initial["x"] != drawn(low=-1, high=1, seed=4).initial["x"]
+    first = drawn(low=-1, high=1, rng=3)
+    assert first == drawn(low=-1, high=1, rng=3)
+    assert first.initial["x"] != drawn(low=-1, high=1, rng=4).initial["x"]
     assert first.initial["x"] != first.initial["v"]
     assert all(-1 <= value <= 1 for value in first.y0)
     assert first.initial["x"][:2] == (
@@ -167,8 +167,8 @@ def test_random_starts_are_reproducible_and_independent() -> None:
 
 def test_random_starts_use_the_seed_of_the_scene() -> None:
     box = {"x": {"low": 0, "high": 1}}
-    assert two(initial=box, seed=7).initial == two(initial={"x": {"low": 0, "high": 1, "seed": 7}}).initial
-    assert two(initial=box, seed=7).initial != two(initial=box, seed=8).initial
+    assert two(initial=box, rng=7).initial == two(initial={"x": {"low": 0, "high": 1, "rng": 7}}).initial
+    assert two(initial=box, rng=7).initial != two(initial=box, rng=8).initial
 
 
 def test_one_number_starts_all() -> None:
@@ -244,7 +244,7 @@ REFUSED = [
     ({"initial": {"x": {1, 2}}}, "initial x"),
     ({"initial": {"x": {"low": 0}}}, "'high' is missing"),
     ({"initial": {"x": {"low": 1, "high": 0}}}, "low <= high"),
-    ({"initial": {"x": {"low": 1, "high": 2, "sed": 0}}}, "did you mean 'seed'?"),
+    ({"initial": {"x": {"low": 1, "high": 2, "sed": 0}}}, "unknown key 'sed'; known: low, high, rng"),
     ({"record": "sync_error"}, "expected a list"),
     ({"record": ["sync_eror"]}, "did you mean 'sync_error'?"),
     ({"record": ["section", "section"]}, "each record once"),
@@ -276,7 +276,7 @@ REFUSED = [
     ({"atol": 0}, "above 0"),
     ({"max_steps": 0}, "max_steps"),
     ({"max_steps": True}, "whole number"),
-    ({"seed": -1}, "seed"),
+    ({"rng": -1}, "rng"),
     ({"title": 3}, "title"),
     ({"zipped": 1}, "true or false"),
     ({"axes": "sigma"}, "Axis objects"),
@@ -416,7 +416,7 @@ def test_another_network_keeps_the_start_that_was_given() -> None:
     """A number and a range fit every number of nodes; a list that no longer fits is refused."""
     many = two(initial={"x": 5, "v": {"low": -1, "high": 1}}).replace(topology=star(5))
     assert many == Scene(topology=star(5), initial={"x": 5, "v": {"low": -1, "high": 1}})
-    assert many.replace(seed=3) == Scene(topology=star(5), initial={"x": 5, "v": {"low": -1, "high": 1}}, seed=3)
+    assert many.replace(rng=3) == Scene(topology=star(5), initial={"x": 5, "v": {"low": -1, "high": 1}}, rng=3)
     assert two().replace(topology=star(5)) == Scene(topology=star(5))
     scene = two(initial={"x": [1, 2]})
     with pytest.raises(

@@ -93,7 +93,7 @@ def test_a_keyword_of_an_unknown_type_needs_a_row() -> None:
         '[topology]\nname = "circulant"\nn = 10\noffsets = [1, 3]',
         '[topology]\nname = "erdos_renyi"\nn = 10\np = 0.5',
         '[topology]\nname = "chain"\nn = 2\n[parameters]\nmu_k = [0.1, "1/8"]\nomega = "2*pi/5"\nmu_s_2 = 0.3',
-        '[topology]\nname = "chain"\nn = 2\n[initial]\nx = {low = -1, high = 1, seed = 3}\nv = [0, 1]',
+        '[topology]\nname = "chain"\nn = 2\n[initial]\nx = {low = -1, high = 1, rng = 3}\nv = [0, 1]',
         '[topology]\nname = "chain"\nn = 2\n[sweep]\nzipped = true\nsigma = [0, 1]\nx_1 = {from = 0, to = 1, count = 2}',
     ],
 )
@@ -121,7 +121,7 @@ WRONG = {
     "a tolerance of nothing": {"rtol": 0},
     "a fraction of a step": {"max_steps": 1.5},
     "no steps": {"max_steps": 0},
-    "a negative seed": {"seed": -1},
+    "a negative seed": {"rng": -1},
     "an unknown integrator": {"integrator": "rk4"},
     "an unknown unit": {"time_unit": "seconds"},
     "an unknown continuation": {"continuation": "upwards"},

@@ -167,7 +167,7 @@ def test_lines_of_a_branch_end_at_its_bifurcations_and_are_of_one_stability(
 FIELDS = {
     "same": {
         "title": "other", "record": ("trajectory",), "observe": {"m": "mean(x)"}, "section": "v_1 rising", "window": 7.0,
-        "sections": {"cut": sc.Section("x_1", "rising")}, "samples": 9, "rtol": 1e-4, "atol": 1e-3, "seed": 5, "rng": 5,
+        "sections": {"cut": sc.Section("x_1", "rising")}, "samples": 9, "rtol": 1e-4, "atol": 1e-3, "rng": 5,
         "nodes": [], "continuation": "up", "zipped": True,
     },
     "other": {"initial": {"x": -1.2, "v": 0.0}},

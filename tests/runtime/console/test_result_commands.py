@@ -112,7 +112,7 @@ def test_init_writes_a_scene_that_runs(
 
 def test_basin_lyapunov_and_orbit_are_the_public_functions(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = folder / "pair.toml"
-    options = ["--samples", 5, "--window", 1, "--set", "sigma=0.3,0.5", "seed=2", "--range", "x=0:0.5", "v=-0.1:0.1"]
+    options = ["--samples", 5, "--window", 1, "--set", "sigma=0.3,0.5", "rng=2", "--range", "x=0:0.5", "v=-0.1:0.1"]
     options += ["--attractor", "moving=mean(v_1**2) > 0.001", "together=synchronous", "--bound", 10, "--json"]
     found = json.loads(printed(capsys, "basin", scene, *options))
     assert np.shape(found["fate"]) == (2, 5)

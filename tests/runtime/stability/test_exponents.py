@@ -291,7 +291,7 @@ def test_a_large_constant_beside_a_motion_does_not_hide_it(force: str, kind: str
 def test_two_fixed_points_with_small_exponents_are_not_averaged() -> None:
     """x = 1 has the exponent -6e-5, x = -1 has 2e-5."""
     node = Field({"x": "x - x**3", "z": "-2e-5*z*(1 + 2*x)"}, initial={"x": 0.05, "z": 0.0})
-    result = exponents(Scene(node, "x->x", PAIR), [0.0, 0.5], transient=20, seed=3)
+    result = exponents(Scene(node, "x->x", PAIR), [0.0, 0.5], transient=20, rng=3)
     assert {a.kind for a in result.attractors} == {"fixed point"}
     assert sorted(set(result.by_start[:, 0].round(9))) == [-6e-5, 2e-5]
     assert len(result.groups) == 2

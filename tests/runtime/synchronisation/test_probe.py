@@ -138,7 +138,7 @@ def test_starts_are_moved_as_a_whole_and_the_median_counts():
     one = universal_probe(SPRINGS, 0.5, 0.1, criterion=replace(criterion, starts=1))
     three = universal_probe(SPRINGS, 0.5, 0.1, criterion=criterion)
     assert float(three.error) == pytest.approx(float(one.error), rel=1e-4)
-    moved = [universal_probe(FRICTION, 0.5, 0.1, criterion=replace(criterion, seed=k, starts=2)).error for k in (0, 1)]
+    moved = [universal_probe(FRICTION, 0.5, 0.1, criterion=replace(criterion, rng=k, starts=2)).error for k in (0, 1)]
     assert abs(moved[0] - moved[1]) > 1e-6
 
 

@@ -262,12 +262,12 @@ def test_the_grid_and_the_rounds_that_refine_its_ends_run_one_kernel():
 
 
 def test_starts_are_moved_by_at_most_the_reach_and_the_first_not_at_all():
-    moves = offsets(replace(PAPER, starts=2000, reach=0.5, seed=3))
+    moves = offsets(replace(PAPER, starts=2000, reach=0.5, rng=3))
     assert moves[0] == 0.0
     assert len(moves) == 2000
     assert (-0.5 <= moves.min() < -0.49, 0.49 < moves.max() <= 0.5) == (True, True)
-    assert offsets(replace(PAPER, starts=2000, reach=0.5, seed=3)).tolist() == moves.tolist()
-    assert offsets(replace(PAPER, starts=2000, reach=0.5, seed=4)).tolist() != moves.tolist()
+    assert offsets(replace(PAPER, starts=2000, reach=0.5, rng=3)).tolist() == moves.tolist()
+    assert offsets(replace(PAPER, starts=2000, reach=0.5, rng=4)).tolist() != moves.tolist()
     assert offsets(replace(PAPER, starts=1)).tolist() == [0.0]
 
 
@@ -403,7 +403,7 @@ def test_the_effort_of_the_exponents_can_be_chosen(monkeypatch):
     monkeypatch.setattr(threshold, "simulate", lambda scene, sigma, *_: Sweep(sigma, 0 * sigma, 0 * sigma, ()))
     scene = Scene(topology=chain(2))
     thresholds(scene, sigma=[0.1, 0.2])
-    thresholds(scene, sigma=[0.1, 0.2], precision=0.1, periods=50, criterion=Criterion(seed=3))
+    thresholds(scene, sigma=[0.1, 0.2], precision=0.1, periods=50, criterion=Criterion(rng=3))
     assert asked == [(1e-3, 5000, 0), (0.1, 50, 3)]
     for bad in ({"precision": "a"}, {"periods": 0}):
         with pytest.raises(ValueError, match=r"precision|periods"):
