@@ -14,7 +14,6 @@ from synchain.models.symmetries.clusters import clusters
 from synchain.runtime.bifurcation.equilibrium import Equilibrium
 from synchain.runtime.bifurcation.kinds import BifurcationKind
 from synchain.runtime.bifurcation.periodic_result import PeriodicOrbit
-from synchain.runtime.bifurcation.phases import Phases
 from synchain.runtime.bifurcation.results import Bifurcation, Branch, Curve, CurvePoint, Diagram
 from synchain.runtime.results.labelled import Labelled
 from synchain.runtime.stability.attractor import Attractor, Motion
@@ -47,7 +46,12 @@ def exponents_on(alpha: np.ndarray) -> Exponents:
 def orbit_at(omega: float) -> PeriodicOrbit:
     """An orbit with a state and complex multipliers."""
     return PeriodicOrbit(
-        PAIR.replace(omega=omega), 2, np.array([0.1, 0.2 * omega]), np.array([0.5 + 0.25j, 0.5 - 0.25j]), 1e-14, 3
+        PAIR.replace(omega=omega),
+        2,
+        np.array([0.1, 0.1, 0.2 * omega, 0.2 * omega]),
+        np.array([0.5 + 0.25j, 0.5 - 0.25j]),
+        1e-14,
+        3,
     )
 
 
@@ -59,11 +63,10 @@ def at_rest() -> Equilibrium:
 
 
 def branch() -> Branch:
-    """A branch of three orbits with a bifurcation and phases."""
+    """A branch of three orbits with a bifurcation."""
     omegas = np.array([1.1, 1.2, 1.3])
     turn = Bifurcation(1.25, BifurcationKind.GRAZING, 1e-9, orbit_at(1.25))
-    phases = tuple(Phases((0, 1), gap, np.inf) for gap in (0.1, 0.2, 0.3))
-    return Branch("omega", omegas, tuple(orbit_at(x) for x in omegas), (turn,), np.zeros(3, int), omegas, phases)
+    return Branch("omega", omegas, tuple(orbit_at(x) for x in omegas), (turn,), np.zeros(3, int), omegas)
 
 
 def hopf() -> Bifurcation:

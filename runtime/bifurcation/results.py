@@ -21,7 +21,6 @@ from ..support.error_text import range_text
 from .equilibrium import Equilibrium
 from .kinds import BifurcationKind
 from .periodic_result import PeriodicOrbit
-from .phases import Phases
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -195,8 +194,6 @@ class Branch(Drawable):
         Number of growing eigenvalues, or of multipliers outside the unit circle.
     lengths : ndarray, shape (k,)
         Arclength from the first solution.
-    phases : tuple of Phases
-        Phases of stick and slip of each orbit; empty for friction that is not set-valued.
     lost : tuple of float
         Values of the parameter at ends at which neither a further solution nor a bifurcation was found.
     ends : tuple of str
@@ -214,7 +211,6 @@ class Branch(Drawable):
     bifurcations: tuple[Bifurcation, ...]
     growing: np.ndarray
     lengths: np.ndarray
-    phases: tuple[Phases, ...] = ()
     lost: tuple[float, ...] = ()
     ends: tuple[str, ...] = ()
 

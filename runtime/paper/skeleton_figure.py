@@ -63,7 +63,7 @@ class SkeletonFigure(NamedTuple):
     """Bifurcation diagram with the branches of orbits."""
 
     motion: Result  # section points over omega
-    branches: tuple[tuple[BranchPoint, ...], ...]  # points of each branch in the order of the parameter
+    branches: tuple[tuple[BranchPoint, ...], ...]  # points of each branch in its order
 
 
 def compute(name: str, runs: FigureRuns) -> SkeletonFigure:
@@ -72,27 +72,32 @@ def compute(name: str, runs: FigureRuns) -> SkeletonFigure:
     cloud, values, searched = FULL
     if (grid := runs.quality.grid) is not None:
         values, searched = max(3, (grid + 1) // 3), max(1, grid // 12)
+    omegas = np.linspace(LOW, HIGH, values)
     branches = skeleton(
         scene.replace(axes=()),
         "omega",
-        np.linspace(LOW, HIGH, values),
+        omegas,
         PERIODS,
         searched,
         show_progress=runs.execution.show_progress,
         progress=runs.execution.progress,
     )
     motion = runs.run(scene.replace(axes=(Axis.between("omega", LOW, HIGH, cloud),)))
-    return SkeletonFigure(motion, tuple(_branch_points(scene, branch) for branch in branches))
+    return SkeletonFigure(motion, tuple(_branch_points(scene, branch, omegas) for branch in branches))
 
 
-def _branch_points(scene: Scene, branch: Branch) -> tuple[BranchPoint, ...]:
+def _branch_points(scene: Scene, branch: Branch, values: np.ndarray) -> tuple[BranchPoint, ...]:
     """Return the orbits of a branch and at its bifurcations, with their points at the section."""
+    # Orbits at the values of the diagram and bifurcations, in the order of the branch.
     orbits = [
-        BranchPoint(float(value), orbit, np.empty(0), phases.words)
-        for value, orbit, phases in zip(branch.values, branch.orbits, branch.phases, strict=True)
+        (length, BranchPoint(float(value), orbit, np.empty(0), phases.words))
+        for length, value, orbit in zip(branch.lengths, branch.values, branch.orbits, strict=True)
+        if value in values and (phases := orbit.phases) is not None
     ]
-    turns = [BranchPoint(t.value, t.orbit, np.empty(0), "", t.kind, t.residual) for t in branch.bifurcations]
-    branch_points = sorted([*orbits, *turns], key=lambda point: point.value)
+    turns = [
+        (t.length, BranchPoint(t.value, t.orbit, np.empty(0), "", t.kind, t.residual)) for t in branch.bifurcations
+    ]
+    branch_points = [point for _, point in sorted([*orbits, *turns], key=lambda pair: pair[0])]
     # Run two of the longest cycles and keep the first half of the crossings, so that a crossing at the start of the
     # run counts once.
     states = np.array([point.orbit.state for point in branch_points])
