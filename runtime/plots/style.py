@@ -8,6 +8,7 @@ depend only on the numbers: they contain no dates, and fixed ids. Text in SVG fi
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -80,8 +81,8 @@ def context() -> Iterator[None]:
 
 
 def symbol(name: str) -> str:
-    """Return a parameter or a state as a formula."""
-    return f"${Latex().letter(name)}$"
+    """Return a parameter or a state as a formula; in an expression, such as "maximum(x_1)", each of them."""
+    return re.sub(r"[^\W\d]\w*\b(?!\()", lambda found: f"${Latex().letter(found[0])}$", name)
 
 
 def new_figure(size: tuple[float, float]) -> Figure:

@@ -17,6 +17,7 @@ from synchain.graphs import chain
 from synchain.models.dynamics.equations import Equations
 from synchain.results import Result
 from synchain.runtime.plots import result_plot, style
+from synchain.runtime.plots.style import symbol
 
 
 @pytest.fixture(autouse=True)
@@ -242,3 +243,16 @@ def test_an_orbit_of_a_coupled_scene_is_drawn() -> None:
     orbit = periodic_orbit(scene)
     x, _ = orbit.plot().lines[0].get_data()
     assert (x[0], x[-1]) == pytest.approx((orbit.state[0],) * 2, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [
+        ("sigma", r"$\sigma$"),
+        ("x_12", "$x_{12}$"),
+        ("maximum(x_1)", "maximum($x_1$)"),
+        ("mean(v_2**2)", "mean($v_2$**2)"),
+    ],
+)
+def test_labels_write_states_of_expressions_as_formulas(name: str, label: str) -> None:
+    assert symbol(name) == label
