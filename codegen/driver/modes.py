@@ -120,7 +120,9 @@ def begin_deviations(cell, old, modes, orbit, dims, functions):
     take_in(modes.vectors[cell], old, modes.registers, modes.owners.size)
     for k in range(modes.registers * LANES):
         modes.powers[k] = 0.0
-    return begin_contacts(old, modes, orbit, dims, functions) if CONTACTS else False
+    if CONTACTS:
+        return begin_contacts(old, modes, orbit, dims, functions)
+    return False
 
 
 @njit(error_model="numpy")
