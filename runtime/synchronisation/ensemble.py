@@ -212,9 +212,9 @@ class Ensemble:
             self._advance(running, lead[running], window[running])
             self._decide()
 
-    def _whole(self, time: np.ndarray) -> np.ndarray:
-        """Return times, reduced to whole periods of the equations."""
-        period = self.period[self.cell]
+    def _whole(self, time: np.ndarray, starts: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """Return times of some starts, reduced to whole periods of the equations."""
+        period = self.period[self.cell[starts]]
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.where(period > 0.0, np.floor(time / period * (1.0 + 1e-12)) * period, time))
 
@@ -263,9 +263,11 @@ class Ensemble:
     def _advance(self, starts: np.ndarray, lead: np.ndarray, window: np.ndarray) -> None:
         """Advance starts by the time `lead`, and observe them over a window after it."""
         if self.continues and lead.any():
-            self._approach(starts, lead)
+            # the next run begins at time 0, so that the drive has its phase only after whole periods
+            whole = self._whole(lead, starts)
+            self._approach(starts, whole)
             going = self.status[starts] == Status.FINISHED
-            starts, lead, window = starts[going], 0.0 * lead[going], window[going]
+            starts, lead, window = starts[going], (lead - whole)[going], window[going]
         if not len(starts):
             return
         begin = lead if self.continues else self.passed[starts] + lead

@@ -481,3 +481,13 @@ def test_the_mode_of_a_contact_is_no_random_number():
     assert varied == ["x_1", "x_2", "v_1", "v_2"]
     with pytest.raises(ValueError, match="unknown component 'slip'; known: x, v"):
         basin(stick, ranges={"slip": (0, 1)})
+
+
+def test_a_driven_motion_keeps_its_phase_when_the_transient_is_no_whole_number_of_periods() -> None:
+    """Three cycles of Duffing's oscillator from starts on their way: the window at 600 begins within a period of 2π."""
+    node = Field({"x": "v", "v": "-0.08*v - x**3 + 0.2*cos(t)"})
+    scene = Scene(node, topology=chain(1), time_unit="time", transient=600.0, window=100.0)
+    tops = {"small": "maximum(x) < 0.3", "large": "maximum(x) > 1", "double": "maximum(x) > 0.5 and maximum(x) < 0.63"}
+    starts = {"x_1": [-0.21, 1.05, -0.67], "v_1": [0.02, 0.77, 0.02]}
+    found = basin(scene.replace(zipped=True), attractors=tops, show_progress=False, **starts)
+    assert [found.labels[k] for k in found.fate[0]] == ["small", "large", "double"]
