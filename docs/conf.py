@@ -80,8 +80,8 @@ copybutton_prompt_is_regexp = True
 
 # Tutorial and gallery: plain files that run when the site is built; what raises fails the build
 sphinx_gallery_conf = {
-    "examples_dirs": ["tutorial", "gallery"],
-    "gallery_dirs": ["built/tutorial", "built/gallery"],
+    "examples_dirs": ["tutorial", "gallery", "../runtime/papers"],
+    "gallery_dirs": ["built/tutorial", "built/gallery", "built/papers"],
     "filename_pattern": r"\.py$",
     "within_subsection_order": "FileNameSortKey",
     "capture_repr": ("_repr_html_",),

@@ -16,6 +16,7 @@ from synchain.runtime.bifurcation.kinds import BifurcationKind
 from synchain.runtime.bifurcation.periodic_result import PeriodicOrbit
 from synchain.runtime.bifurcation.results import Bifurcation, Branch, Curve, CurvePoint, Diagram
 from synchain.runtime.results.labelled import Labelled
+from synchain.runtime.results.reproduction import Reproduction
 from synchain.runtime.stability.attractor import Attractor, Motion
 from synchain.runtime.stability.cluster_exponents import ClusterExponents
 from synchain.runtime.stability.exponents import Exponents
@@ -191,5 +192,6 @@ def every_kind() -> dict[str, Labelled]:
         ),
         transition(),
         TransitionCheck(transition(), np.array([[0.2, 0.4]]), np.array([[-0.1, np.nan]]), np.ones((1, 2)), ("w",)),
+        Reproduction({"threshold": (1.0, 1.1, 0.2), "count": (2.0, 3.0, 0.0)}),
     )
     return {type(value).__name__: value for value in values}

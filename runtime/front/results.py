@@ -24,6 +24,7 @@ HOMES = {
     "Plane": "runtime.stability.msf",
     "Probe": "runtime.synchronisation.probe",
     "Progress": "runtime.support.progress",
+    "Reproduction": "runtime.results.reproduction",
     "Result": "runtime.results.result",
     "Status": "runtime.support.status",
     "Streamed": "runtime.sweeps.stream",

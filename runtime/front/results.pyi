@@ -5,6 +5,7 @@ from synchain.runtime.bifurcation.results import Bifurcation as Bifurcation
 from synchain.runtime.bifurcation.results import Branch as Branch
 from synchain.runtime.bifurcation.results import Curve as Curve
 from synchain.runtime.bifurcation.results import Diagram as Diagram
+from synchain.runtime.results.reproduction import Reproduction as Reproduction
 from synchain.runtime.results.result import Result as Result
 from synchain.runtime.stability.cluster_exponents import ClusterExponents as ClusterExponents
 from synchain.runtime.stability.exponents import Exponents as Exponents

@@ -16,6 +16,7 @@ from synchain.models.spectra.spectrum import Spectrum
 from ..bifurcation.equilibrium import Equilibrium
 from ..bifurcation.periodic_result import PeriodicOrbit
 from ..bifurcation.results import Bifurcation, Branch, Curve, Diagram
+from ..results.reproduction import Reproduction
 from ..results.result import Result
 from ..stability.cluster_exponents import BlockVerdict, ClusterExponents
 from ..stability.exponents import Exponents
@@ -164,6 +165,19 @@ def _(value: ClusterExponents, axes: Axes, **style: Any) -> Axes:
     axes.set_xticks(range(1, len(names) + 1), names)
     axes.set_ylabel("exponent per unit of time")
     axes.margins(x=0.2)
+    return axes
+
+
+@_draw.register
+def _(value: Reproduction, axes: Axes, **style: Any) -> Axes:
+    """Draw each computed number less the published one, in units of the largest difference that counts as agreement."""
+    published, found, difference = np.array([*value.claims.values()]).T
+    units = np.where(difference > 0.0, difference, np.where(published == 0.0, 1.0, np.abs(published)))
+    heights = np.arange(len(units))[::-1]
+    axes.axvspan(-1.0, 1.0, color=GREY, alpha=0.25, linewidth=0.0)
+    axes.plot((found - published) / units, heights, **line_style(style, color=BLUE, linestyle="none", marker="o"))
+    axes.set_yticks(heights, list(value.claims))
+    axes.set(xlabel="found − published, in units of what counts as agreement", ylim=(-0.6, len(units) - 0.4))
     return axes
 
 

@@ -1,4 +1,4 @@
-"""List and import the modules of a folder that has one file for each command, benchmark or figure."""
+"""List and import the modules of a folder that has one file for each command, benchmark or paper."""
 
 from __future__ import annotations
 
@@ -15,10 +15,15 @@ def names(path: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted(m.name for m in iter_modules(path) if not m.ispkg and not m.name.startswith("_")))
 
 
-def load(what: str, name: str, package: str, path: Iterable[str]) -> ModuleType:
-    """Return a module of a package."""
+def check_name(what: str, name: str, path: Iterable[str]) -> None:
+    """Raise ValueError if a package has no module of this name."""
     valid_names = names(path)
     if name not in valid_names:
         listing = ", ".join(valid_names)
         raise ValueError(f"unknown {what} {short_repr(name)}; known: {listing}{suggestion(name, valid_names)}")
+
+
+def load(what: str, name: str, package: str, path: Iterable[str]) -> ModuleType:
+    """Return a module of a package."""
+    check_name(what, name, path)
     return import_module(f".{name}", package)
