@@ -347,6 +347,12 @@ def _bifurcation(problem: Equilibria | Cycles, located: Located) -> Bifurcation:
 def _joined(name: str, parts: list[Part]) -> Branch:
     """Return the branch of the parts that were followed in each direction from its first solution."""
     points, found, ends = parts[-1]
+    begin = points[0][1]
+    if isinstance(begin, Equilibrium) and not begin.complete:
+        warn(
+            f"follow: found {len(begin.state)} states without blocks by modes; expected fewer for all eigenvalues; Hopf points "
+            f"are looked for in the {len(begin.eigenvalues)} eigenvalues nearest to zero, folds by turns"
+        )
     both: tuple[str, ...] = (ends,)
     if len(parts) == 2:
         behind, found_behind, end_behind = parts[0]

@@ -277,7 +277,8 @@ def test_a_large_network_without_blocks_folds() -> None:
     power = 0.3 * (-1.0) ** np.arange(n)
     power[:2] = 0.35, -0.35
     scene = sc.Scene(MACHINE, LINE, sc.graphs.ring(n), parameters={"P": power.tolist(), "K": 2})
-    branch = sc.follow(sc.equilibrium(scene), "K", to=0.15)
+    with pytest.warns(RuntimeWarning, match="Hopf points are looked for in the 12 eigenvalues nearest to zero"):
+        branch = sc.follow(sc.equilibrium(scene), "K", to=0.15)
     (fold,) = branch.bifurcations
     assert (str(fold.kind), branch.ends) == ("fold", ("K = 2",))
     assert not branch.stable.any()
