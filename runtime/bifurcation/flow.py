@@ -31,6 +31,7 @@ from synchain.models.scenes.scene import Scene
 from ..cells.drive_times import longest_steps, periods
 from ..cells.initial_modes import with_modes
 from ..cells.plan import FIRST_STEP, CellRows
+from ..cells.row_modes import row_modes
 from ..engines.choice import chosen_for_modes, chosen_for_rows
 from ..engines.job import JobSpec, RowsJob, RowsSpec
 from ..engines.step_control import control_array
@@ -86,7 +87,12 @@ def flow_of(scene: Scene, equations: Equations, names: Sequence[str], state: np.
     """
     present = tuple(name for name in names if name in equations.parameters)
     if equations.sticks:
-        return ContactFlow(scene, equations, present, tuple(names), equations.n * 2)
+        if equations.has_rows and names:
+            raise ValueError(
+                "follow: found stops, resets, surfaces, several contacts or moving grounds; expected friction of one coordinate on "
+                "a ground of constant velocity; find single orbits with periodic_orbit"
+            )
+        return ContactFlow(scene, equations, present, tuple(names), equations.n * len(equations.node.continuous))
     lift, job = _job(scene.replace(rtol=TOLERANCE, atol=None), equations, present, tuple(map(float, state)))
     return LiftedFlow(equations, lift, job, present, tuple(names), equations.dimension, _linearised(equations))
 
@@ -278,12 +284,19 @@ class ContactFlow:
         """Return states with slip states; a velocity that differs from the ground's by rounding is the ground's."""
         n = self.equations.n
         numbers = np.tile([values[name] for name in self.equations.parameters], (len(states), 1))
+        modes = np.zeros((len(states), self.equations.dimension - self.size))
+        if self.equations.has_rows:
+            slack = STICKS * TOLERANCE * float(np.abs(states).max())
+            try:
+                return row_modes(self.equations, np.hstack([states, modes]), numbers, slack)
+            except ValueError as problem:  # Newton's method looks behind a stop or a guard
+                raise ArithmeticError(str(problem)) from None
         states, grounds = states.copy(), _grounds(self.equations)(*numbers[0])
         velocities = states[:, n:]
         speeds = np.maximum(np.abs(velocities).max(axis=0), np.abs(grounds))
         near = np.abs(velocities - grounds) <= STICKS * TOLERANCE * (speeds + np.abs(states[:, :n]).max(axis=0))
         velocities[near] = np.broadcast_to(grounds, velocities.shape)[near]
-        return with_modes(self.equations, np.hstack([states, np.zeros((len(states), n))]), numbers)
+        return with_modes(self.equations, np.hstack([states, modes]), numbers)
 
     def advance(self, values: Mapping[str, float], states: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Integrate the states; the deviations come along."""
@@ -293,16 +306,18 @@ class ContactFlow:
         """Integrate each segment with all its deviations."""
         (m, n), q = states.shape, len(self.present)
         integrator = self._integrator(values, self._with_slips(values, states))
-        grounds = _ground_slopes(self.equations, self.present)(*integrator.parameter_values[0])
         columns = np.eye(n + q)
-        columns[n // 2 : n, n:] -= grounds  # velocities relative to the ground
+        if q:  # velocities relative to the ground
+            grounds = _ground_slopes(self.equations, self.present)(*integrator.parameter_values[0])
+            columns[n // 2 : n, n:] -= grounds
         integrator.control[Control.ATOL] = LEAST * TOLERANCE * float(scale[scale > 0.0].min(initial=1.0))
         lengths = np.linalg.norm(columns, axis=0)
         integrator.set_deviations(np.tile(columns / lengths, (m, 1, 1)))
         growth = integrator.advance(times)
         with np.errstate(all="ignore"):  # over a long transient deviations leave the range of numbers
             matrices = integrator.deviations * (np.exp(growth) * lengths)[:, None, :]
-        matrices[:, n // 2 : n, n:] += grounds
+        if q:
+            matrices[:, n // 2 : n, n:] += grounds
         self.steps = float(times.sum() / max(1, integrator.steps))
         moved = np.zeros((m, n, len(self.names)))
         moved[:, :, [self.names.index(name) for name in self.present]] = matrices[:, :n, n:]

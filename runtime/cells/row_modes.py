@@ -16,8 +16,11 @@ from synchain.models.mechanics.rows import Law, Row
 Values = dict[sp.Symbol, np.ndarray]
 
 
-def row_modes(equations: Equations, start: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-    """Return initial states (cells, dimension) with the modes that follow from the other states at time 0."""
+def row_modes(equations: Equations, start: np.ndarray, parameters: np.ndarray, slack: float = 0.0) -> np.ndarray:
+    """Return initial states (cells, dimension) with the modes that follow from the other states at time 0.
+
+    Levels and speeds of at most `slack` are zero.
+    """
     states = np.array(start, dtype=float)
     values: Values = {
         sp.Symbol(p, real=True): c[:, None] for p, c in zip(equations.parameters, parameters.T, strict=True)
@@ -33,6 +36,8 @@ def row_modes(equations: Equations, start: np.ndarray, parameters: np.ndarray) -
         inside = values | _of_nodes(equations, node, members, values, states)
         for a, row in enumerate(node.rows):
             level, speed = (_at(e, inside, (len(states), len(members))) for e in (row.level, row.speed))
+            if row.law is not Law.RESET:
+                level, speed = (np.where(abs(e) <= slack, 0.0, e) for e in (level, speed))
             _check_start(row, level, speed, members)
             if row.law is Law.RESET:
                 continue

@@ -56,7 +56,13 @@ def test_a_ball_on_a_shaken_table() -> None:
     )
     top = np.sin(2 * np.pi * phase) / 80 + 0.125
     pair = 0.2549107471568807 + 0.7583010688268353j * np.array([-1, 1])
-    assert multipliers(lone(ball, x=top, v=0.0)) == pytest.approx(pair, abs=1e-11)
+    orbit = sc.periodic_orbit(lone(ball, x=top, v=0.0), 1)
+    assert np.sort_complex(orbit.multipliers) == pytest.approx(pair, abs=1e-11)
+    assert orbit.phases is None
+    with pytest.raises(ValueError, match=r"follow: found stops, .*; find single orbits with periodic_orbit"):
+        sc.follow(orbit, "late", to=1)
+    with pytest.raises(ArithmeticError, match=r"found node 1 with the gap .* closed"):
+        sc.periodic_orbit(lone(ball, x=0.13, v=0.0), 1, start=[-0.02, 0.0])
 
 
 def test_stick_static_drop_and_stop() -> None:
