@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from numba import njit
 
-from ..simd.lanes import absolute, any_lane, broadcast, load, minimum, select, store
+from ..simd.lanes import absolute, any_lane, broadcast, lane_bits, load, minimum, select, store
 from .clock_slots import LOOPED, WIDTH
 from .dense import inside
 
@@ -50,9 +50,13 @@ def gap_inside(theta, step, friction):
 
 @njit(error_model="numpy")
 def change_modes(moved, t, y, friction):
-    """Let every contact with a closed gap stick, slip or turn, by the forces on it; `t` is the time of the event."""
-    if not any_lane(moved & (smallest_gap(t, y, y, friction) <= 0.0)):
-        return
+    """Let every contact with a closed gap stick, slip or turn, by the forces on it; return the lanes with events.
+
+    `t` is the time of the event.  The groups of the looks get, for the record of events: 1 for an event, mode before, after.
+    """
+    shut = moved & (smallest_gap(t, y, y, friction) <= 0.0)
+    if not any_lane(shut):
+        return 0
     out, dims = friction.out, friction.dims
     for i in range(dims.nodes):
         slip, speed = load(y, 2 * dims.nodes + i, WIDTH), load(y, dims.nodes + i, WIDTH)
@@ -63,4 +67,9 @@ def change_modes(moved, t, y, friction):
         lands = select(up < 0.0, 1.0, select(down > 0.0, -1.0, broadcast(0.0, WIDTH)))
         leaves = select(up <= 0.0, 1.0, -1.0 + 0.0 * slip)
         store(y, dims.nodes + i, select(touch, load(out, dims.nodes + i, WIDTH), speed))
-        store(y, 2 * dims.nodes + i, select(touch, lands, select(leave, leaves, slip)))
+        after = select(touch, lands, select(leave, leaves, slip))
+        store(y, 2 * dims.nodes + i, after)
+        store(out, 6 * dims.nodes + i, select(touch | leave, 1.0, 0.0 * slip))
+        store(out, 7 * dims.nodes + i, slip)
+        store(out, 8 * dims.nodes + i, after)
+    return lane_bits(shut)

@@ -41,6 +41,8 @@ class Dimensions(NamedTuple):
     """The largest number of rows of a node."""
     contacts: int
     """Groups of memory for the output of `pushes`, and for what the driver stores behind it."""
+    events: int
+    """1 if events are recorded, else 0."""
 
 
 class ModeDimensions(NamedTuple):

@@ -10,10 +10,11 @@ error shows it to a step in stick.
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, minimum, select, store
-from .clock_slots import ACCEPTED, REJECTED, RUSH, STEP, STOP, WIDTH
+from .clock_slots import ACCEPTED, N_POINTS, REJECTED, RUSH, STEP, STOP, WIDTH
 from .contacts import gap_inside, gap_of, smallest_gap
 
 # --- kernel text below ---
@@ -143,6 +144,24 @@ def narrowed(side, low, high, f_low, f_high, step, friction):
             low, f_low = select(above, theta, low), select(above, gap, less_low)
             last = select(below, -1.0, select(above, 1.0, last))
     return high
+
+
+@njit(error_model="numpy")
+def note_events(lanes, time, cell, counts, points, friction):
+    """Append the events of some lanes to the points of their cells: time, row, mode before and after."""
+    out, rows, when = friction.out, friction.dims.rows, np.empty(WIDTH)
+    store(when, 0, time)
+    for lane in range(WIDTH):
+        for row in range(rows if (lanes >> lane) & 1 else 0):
+            if out[(6 * rows + row) * WIDTH + lane] == 0.0:
+                continue
+            # events beyond the room are counted and not stored
+            index = counts[cell[lane], N_POINTS]
+            counts[cell[lane], N_POINTS] = index + 1
+            if index < points.shape[1]:
+                points[cell[lane], index, 0], points[cell[lane], index, 1] = when[lane], row
+                for k in range(2):
+                    points[cell[lane], index, 2 + k] = out[((7 + k) * rows + row) * WIDTH + lane]
 
 
 @njit(error_model="numpy", forceinline=True)

@@ -30,8 +30,8 @@ LEVEL, GAP, MODE, SPEED, RATE, RATIO, LAW, NUMBER, K = 0, 1, 2, 3, 4, 5, 9, 10, 
 OF_SIGN, OF_STOP, OF_RESET = 0.0, 1.0, 2.0
 # What an event means for a row: nothing, its mode is known, it is decided, it lets go to the side of its force.
 UNTOUCHED, KNOWN, OPEN, RELEASED = 0.0, 1.0, 2.0, 3.0
-# Columns of the notes on rows: what the event means, mode and speed before, x before.
-ROLE, BEFORE, SPEED_BEFORE, X = 0, 1, 2, 3
+# Columns of the notes on rows: what the event means, mode and speed before, x before, 1 if the gap has closed.
+ROLE, BEFORE, SPEED_BEFORE, X, SHUT = 0, 1, 2, 3, 4
 # A pivot, or a change of a speed, this much smaller than what it is the difference of is zero.
 NONE = 1e-12
 # A rebound of this height is about as small as a step sees.
@@ -264,6 +264,7 @@ def begin_event(notes, lane, first, size, friction):
             number(SPEED, row, lane, out, dims),
             x[a],
         )
+        notes[row, SHUT] = 1.0 if shut else 0.0
         if chosen[a]:
             notes[row, ROLE] = RELEASED if shut else OPEN
         else:
@@ -360,15 +361,19 @@ def size_of(first, lane, out, dims):
 
 @njit(error_model="numpy")
 def change_modes(moved, t, y, friction):
-    """Let the rows of every node with a closed gap rebound, reset, be held, slip or open; keep held rows on surfaces."""
+    """Let the rows of every node with a closed gap rebound, reset, be held, slip or open; return the lanes with events.
+
+    Held rows are kept on their surfaces.  The groups of the looks get, for the record of events: 1 for an event, mode
+    before and after.
+    """
     if not any_lane(moved):
-        return
+        return 0
     out, dims = friction.out, friction.dims
     shut = moved & (smallest_gap(t, y, y, friction) <= 0.0)
     for group in range(K + dims.felt, K + dims.felt + 3):
         for row in range(dims.rows):
             store(out, place(group, row, dims), broadcast(0.0, WIDTH))
-    notes, active, events = np.zeros((WIDTH, dims.rows, 4)), lane_bits(moved), lane_bits(shut)
+    notes, active, events = np.zeros((WIDTH, dims.rows, 5)), lane_bits(moved), lane_bits(shut)
     for part in range(2):
         if part > 0 and events == 0:
             break
@@ -402,3 +407,10 @@ def change_modes(moved, t, y, friction):
             strike(t, y, friction)
         if part == 0 and struck and events != 0:
             push(t, y, y, friction)
+    for lane in range(WIDTH):
+        for row in range(dims.rows if (events >> lane) & 1 else 0):
+            before, after = notes[lane, row, BEFORE], number(MODE, row, lane, out, dims)
+            put(out, place(6, row, dims), lane, 1.0 if notes[lane, row, SHUT] != 0.0 or before != after else 0.0)
+            put(out, place(7, row, dims), lane, before)
+            put(out, place(8, row, dims), lane, after)
+    return events

@@ -16,7 +16,7 @@ from .cells import REPEATING, aligned, come_back, fill, finish, outcome, put, se
 from .clock_slots import *
 from .contacts import change_modes
 from .control import accept_series, advance, aim, arrive, judge, pause, wrap
-from .passages import note_rush, take_back
+from .passages import note_events, note_rush, take_back
 from .records import Friction, Results, Rows, Step
 from .spread import spread
 
@@ -186,7 +186,9 @@ def drive(functions, dims, multiplicity, rule, network, first, last, inputs, out
         # 6. Move the accepted lanes to the end of the step, and find the lanes that step 3 must look at.
         largest = advance(clock, y, t, t_new, accept, y_new, dims)
         if CONTACTS:
-            change_modes(accept, t_new, y, friction)
+            changed = change_modes(accept, t_new, y, friction) & lane_bits(counted)
+            if dims.events and changed != 0:
+                note_events(changed, load(clock, BASE, WIDTH) + t_new, cell, counts, points, friction)
         if SERIES:
             wrap(clock)
         look = ALL if steering[CANCEL] != 0.0 else lane_bits(pause(clock, largest))

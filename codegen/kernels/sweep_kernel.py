@@ -176,6 +176,7 @@ def emit(
             rows=rows,
             felt=felt,
             contacts=contact_groups(plain),
+            events=int("events" in recording.records),
         ),
         recording.multiplicity if compares and recording.multiplicity is not None else (1,) * equations.n,
         rule_of(method),

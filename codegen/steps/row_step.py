@@ -31,7 +31,7 @@ from ..program.passes import Names, real, share
 from ..program.statements import Assign, Function, If, Role, Statement, accumulate, let, store
 from .blocks import assigned
 from .contact_step import SIDES, jump_sides, parameter_loads, register, time_gaps
-from .places import Joint, Span, StateLayout, link_ends, named
+from .places import Joint, Span, StateLayout, by_kind, link_ends, named
 from .safe_names import NAMES
 from .step import lane
 
@@ -194,7 +194,7 @@ class _WrittenOut(_Writer):
     def parts(self) -> list[tuple[int, int, tuple[Row, ...]]]:
         """Return each node with its first row and its rows."""
         parts, first = [], 0
-        for i in range(self.equations.n):
+        for i in by_kind(self.equations):
             rows = self.equations.rows_at(i)
             parts.append((i, first, rows))
             first += len(rows)

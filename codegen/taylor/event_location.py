@@ -127,10 +127,13 @@ class Stored(NamedTuple):
         return let("passed", call("passage", side, size, part, nearest, *coefficients))
 
 
-def closings(mode: str, exact: bool, gaps: Sequence[Stored], stuck: str, room: Expression) -> list[Statement]:
+def closings(
+    mode: str, exact: bool, gaps: Sequence[Stored], stuck: str, room: Expression, rounds: int
+) -> list[Statement]:
     """Return the statements that end a step where one of the gaps of a contact or row closes.
 
     stuck: name of the variable that is 1 in stick and 0 in slip; room: memory for the coefficients of a gap.
+    rounds: a second search ends at the first passage, and is as exact as the shorter way to it allows.
     """
     late = 0.0 * Name("t") if exact else LATE * Name(stuck)
     statements: list[Statement] = []
@@ -139,7 +142,7 @@ def closings(mode: str, exact: bool, gaps: Sequence[Stored], stuck: str, room: E
     # the first gap can close in stick and in slip, the second gap only in stick
     for side, gap in zip((ONE + 0.0 * Name("t"), Name(stuck)), gaps, strict=False):
         coefficients = ("dense", gap.first, room, gap.order, "passed")
-        statements.append(let("passed", call("closing", side, late, gap.size, "nearest", *coefficients)))
+        statements += [let("passed", call("closing", side, late, gap.size, "nearest", *coefficients))] * rounds
     return statements
 
 

@@ -427,7 +427,9 @@ class LoopedSeries(TaylorStepWriter):
             gaps = tuple(Outer(Slot("gaps", index)) for index in indices)
             sizes = tuple(Load("dense", plus(Name("at_sizes"), index)) for index in indices)
             mode, names = self.called.get(condition.mode.name, "t"), ("rise", "fall")[: len(indices)]
-            section.contacts.append(Gaps(mode, "stuck", gaps, names, sizes, Name("at_closing")))
+            section.contacts.append(
+                Gaps(mode, "stuck", gaps, names, sizes, Name("at_closing"), 1 + self.equations.has_rows)
+            )
         return section
 
     def link(self, joint: Joint, hoisted: Hoisted) -> SeriesLoop:

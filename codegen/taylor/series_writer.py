@@ -27,7 +27,7 @@ class Gaps:
     The sizes bound rounding errors.
 
     names: variables that hold the sizes; stuck: variable that is 1 in stick and 0 in slip; room: memory for the
-    series of one gap.
+    series of one gap; rounds: searches for a passage.
     """
 
     mode: str
@@ -36,6 +36,7 @@ class Gaps:
     names: tuple[str, ...]
     sizes: tuple[Expression, ...]
     room: Expression
+    rounds: int = 1
 
 
 @dataclass(eq=False)
@@ -201,7 +202,7 @@ class SeriesWriter(Order):
         statements = [statement for kink in self.graph.kinks for statement in self.passage(kink)]
         for gaps in self.contacts:
             stores, both = self.stored(gaps.series, gaps.sizes)
-            statements += [*stores, *closings(gaps.mode, exact, both, gaps.stuck, gaps.room)]
+            statements += [*stores, *closings(gaps.mode, exact, both, gaps.stuck, gaps.room, gaps.rounds)]
         return self.in_loop(statements)
 
     def passage(self, kink: Kink) -> list[Statement]:

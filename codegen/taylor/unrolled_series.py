@@ -234,7 +234,7 @@ class UnrolledSeries(TaylorStepWriter):
                 name = self.called.get(condition.mode.name, f"guard_{i}_{k}")
                 sizes = tuple(f"size_{name}_{way}" for way in ("rise", "fall")[: len(series)])
                 room = Number(self.lines.room + 2 * (self.order + 1))
-                yield Gaps(name, f"stuck_{name}", series, sizes, tuple(map(Name, sizes)), room)
+                yield Gaps(name, f"stuck_{name}", series, sizes, tuple(map(Name, sizes)), room, 1 + eq.has_rows)
 
     def of_network(self) -> Symbols:
         """Return the series, or the constants, for the symbols of the whole network."""

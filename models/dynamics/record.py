@@ -11,3 +11,4 @@ class Record(Word):
     SYNC_ERROR = "sync_error"
     SECTION = "section"
     TRAJECTORY = "trajectory"
+    EVENTS = "events"

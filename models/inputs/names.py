@@ -9,7 +9,8 @@ _DIGITS = 9
 """Most digits of the number of a node in a name."""
 
 TAKEN = frozenset(
-    {"atol_used", "cell", "component", "drive_phase", "end", "end_time", "ended_early", "integrator", "method_steps", "methods",
+    {"atol_used", "cell", "component", "drive_phase", "end", "end_time", "ended_early", "event", "event_after", "event_before", "event_count",
+     "event_node", "event_row", "event_time", "integrator", "method_steps", "methods",
      "node", "part", "periods_skipped", "point", "realisation", "rejected", "rtol_used", "sample", "section", "section_count",
      "section_time", "start_state", "start_time", "status", "steps", "sync_error", "sync_error_end", "sync_error_max", "time",
      "trajectory",
@@ -18,7 +19,7 @@ TAKEN = frozenset(
 """Variables and coordinates of results."""
 
 ATTRIBUTES = frozenset(
-    {"animate", "as_dict", "belongs_to", "data", "integrators", "isel", "kind", "link", "message", "name", "names", "plot", "restore", "save", "scene",
+    {"animate", "as_dict", "belongs_to", "data", "events", "integrators", "isel", "kind", "link", "message", "name", "names", "plot", "restore", "save", "scene",
      "sel", "state", "states", "stepped", "success", "summary", "to_dataframe", "to_xarray"}
 )  # fmt: skip
 """Attributes of results and of their data; a variable with such a name would be hidden."""

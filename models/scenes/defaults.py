@@ -205,6 +205,10 @@ def _records(model: Model, record: object, sampled: bool) -> tuple[Record, ...]:
         )
     if Record.SYNC_ERROR in names and not common:
         raise ValueError("record: found 'sync_error', but these oscillators have no states of one name to compare")
+    if Record.EVENTS in names and not model.unlinked.sticks:
+        raise ValueError(
+            "record: found 'events', but no node has any; expected set-valued contacts, stops, resets or surfaces"
+        )
     names += [Record.TRAJECTORY] if sampled else []
     return tuple(name for name in Record if name in names)
 
@@ -237,7 +241,7 @@ def _check_sample_times(times: Sequence[float], transient: float, window: float)
 
 def _section(model: Model, section_text: object) -> Section:
     """Return the section; by default the first velocity, or the first state of a vector field, falls through 0."""
-    states = tuple(s.name for s in model.unlinked.node_at(0).state)
+    states = tuple(s.name for s in model.unlinked.node_at(0).continuous)
     crossed = states[0] if isinstance(model.kinds[model.kind_of[0]].oscillator.model, FieldModel) else states[-1]
     default = f"{'v' if 'v' in states else crossed}_1 falling"
     section = Section.parse(default if section_text is None else section_text)
@@ -250,6 +254,8 @@ def _check_sections(values: Mapping[str, Any]) -> None:
     other = "sections" if values["sections"] else "stop" if values["stop"] else None
     if Record.SECTION in values["record"] and other:
         raise ValueError(f"record: found 'section' beside {other}; expected one of them; make it one of the sections")
+    if Record.EVENTS in values["record"] and (other or Record.SECTION in values["record"]):
+        raise ValueError(f"record: found 'events' beside {other or 'section'}; expected one of them")
     variables = {f"{name}{ending}" for name in values["sections"] for ending in ENDINGS}
     twice = sorted(variables & {*values["observe"]})
     if twice:

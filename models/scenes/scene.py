@@ -75,7 +75,7 @@ class Scene(HasDrawing, HasLatex):
     initial : mapping, optional
         Initial states: a number, one number for each node, or {low, high, rng} for random ones.
     record : iterable of str, optional
-        Records of each cell: "sync_error", "section", "trajectory".
+        Records of each cell: "sync_error", "section", "trajectory", "events" of contacts, stops, resets and surfaces.
     observe : mapping of str to Observable or str, optional
         Observables of each cell by name: `mean`, `maximum`, `minimum`, `end` or `variance` over the window of an
         expression of the states, such as ``"mean(nodes.mean(v**2/2))"``.  The result has a variable of each name.

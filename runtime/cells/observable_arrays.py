@@ -13,6 +13,7 @@ from synchain.codegen.driver.columns import SumColumn, Tally
 from synchain.codegen.kernels.observable_functions import Recording, with_rows
 from synchain.models.dynamics.observable import ENERGY, ObservedWindow
 from synchain.models.dynamics.observable_text import as_value
+from synchain.models.dynamics.record import Record
 from synchain.models.scenes.energy import energy_terms as exact_energy
 from synchain.models.scenes.observables import has_own_energy
 from synchain.models.scenes.scene import Scene, Section
@@ -124,6 +125,8 @@ class Sections:
 
     def width(self, dimension: int) -> int:
         """Return the size of a section point without its time; `dimension` if sections are on states."""
+        if Record.EVENTS in self.scene.record:
+            return 3  # row, its mode before and after
         if not self.values:
             return dimension
         return 1 + max(len(parts) - 1 for parts in self.values)
@@ -131,6 +134,19 @@ class Sections:
     def variables(self, points: np.ndarray, most: int) -> Iterator[tuple[str, tuple[str, ...], np.ndarray]]:
         """Yield names, dimensions and values of the variables out of points (cells, room, 1 + width)."""
         room = max(most, 1)
+        if Record.EVENTS in self.scene.record:
+            events = np.full((len(points), room, 4), np.nan)
+            width = min(room, points.shape[1])
+            events[:, :width] = points[:, :width]
+            known = np.isfinite(events[:, :, 1])
+            owners = np.array(self.owners, dtype=float).reshape(-1, 2)
+            rows = owners[np.where(known, events[:, :, 1], 0).astype(int)]
+            yield "event_count", (), np.isfinite(points[:, :, 0]).sum(axis=1).astype(np.int32)
+            yield "event_time", ("event",), events[:, :, 0]
+            yield "event_node", ("event",), np.where(known, rows[:, :, 0] + 1, np.nan)
+            yield "event_row", ("event",), np.where(known, rows[:, :, 1] + 1, np.nan)
+            yield "event_before", ("event",), events[:, :, 2]
+            yield "event_after", ("event",), events[:, :, 3]
         for k, (name, section) in enumerate(self.scene.sections.items()):
             # Move the points of this section to the front, in order, without the column of the section's number.
             belongs = points[:, :, 1] == k
@@ -144,9 +160,23 @@ class Sections:
             if _kept(section):
                 yield name, ("point", f"{name}_kept"), rows[:, :, 1:]
 
+    @cached_property
+    def owners(self) -> list[tuple[int, int]]:
+        """The node, and the number in the node, of each contact or row in the order of the kernel: kind after kind."""
+        equations = self.scene.equations
+        nodes = sorted(range(equations.n), key=equations.kind_of.__getitem__)
+        return [(i, a) for i in nodes for a in range(len(equations.node_at(i).conditions))]
+
     def points(self, cells: int, data: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the points (cells, room, 1 + width) from variables by name; the inverse of `variables`."""
         parts = []
+        if Record.EVENTS in self.scene.record:
+            places = {owner: row for row, owner in enumerate(self.owners)}
+            ends = np.stack([data["event_node"], data["event_row"]], axis=-1).reshape(cells, -1, 2)
+            rows = [[places[int(i) - 1, int(a) - 1] if i == i else np.nan for i, a in cell] for cell in ends]
+            columns = (data[f"event_{name}"].reshape(cells, -1) for name in ("time", "before", "after"))
+            time, before, after = columns
+            return np.stack([time, np.array(rows, dtype=float).reshape(time.shape), before, after], axis=-1)
         for k, (name, section) in enumerate(self.scene.sections.items()):
             times = np.reshape(data[f"{name}_time"], (cells, -1))
             part = np.full((*times.shape, 1 + self.width(0)), np.nan)

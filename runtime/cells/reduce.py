@@ -18,6 +18,7 @@ import sympy as sp
 from synchain.codegen.driver.columns import PointColumn, SumColumn
 from synchain.codegen.kernels.observable_functions import Recording
 from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.record import Record
 from synchain.models.dynamics.reduction import NoQuotient, quotient, substitute_constants
 from synchain.models.inputs.checks import check_flag
 from synchain.models.inputs.names import NodeName
@@ -293,7 +294,7 @@ def _merge(
     if equations.mixed:
         kept.append("quotient: nodes of several kinds are stepped one by one")
         return unmerged
-    if scene.observe or scene.sections or scene.stop:
+    if scene.observe or scene.sections or scene.stop or Record.EVENTS in scene.record:
         kept.append(f"quotient: the {n} oscillators are observed one by one")
         return unmerged
     # If all starts of a component differ in every cell, nothing merges: decide at once, without the search for classes.

@@ -198,7 +198,7 @@ def first_room(scene: Scene, row: int) -> int:
 
     `row`: numbers in a block for one more section point of every cell.
     """
-    if "section" not in scene.record and not scene.sections:
+    if not {"section", "events"} & {*scene.record} and not scene.sections:
         return 0
     periods = scene.window if scene.time_unit == "period" else scene.window / math.pi
     return int(min(2.0 * max(len(scene.sections), 1) * periods, 1e6, LARGEST_ROOM // row)) + 8

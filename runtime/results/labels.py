@@ -35,7 +35,7 @@ START_STATE = "start_state"
 END_TIME, DRIVE_PHASE = "end_time", "drive_phase"
 """Coordinates of each cell: the time at which it stopped, and the phase of the drive there, from 0 to 1."""
 
-TIMES = ("time", "section_time", END_TIME, DRIVE_PHASE)
+TIMES = ("time", "section_time", "event_time", END_TIME, DRIVE_PHASE)
 """Variables that are coordinates of other variables."""
 
 TEXTS = ("scene", "title", "equations", "kernel", "versions")
@@ -55,6 +55,12 @@ MEANINGS = {
     "section_count": "number of section points in the window",
     "section_time": "times of the section points",
     "section": "states at the section points, NaN where there are fewer",
+    "event_count": "number of events in the window",
+    "event_time": "times of the events",
+    "event_node": "node of the event",
+    "event_row": "contact, stop, reset or surface of the node, from 1",
+    "event_before": "mode before the event: sign of the level, 0 held; of a stop 1 open, 0 closed",
+    "event_after": "mode after the event",
     "trajectory": "states at equally spaced times of the window",
     "time": "times of the trajectory",
     "transversal_exponent": "largest transversal exponent of the synchronous state",
@@ -74,7 +80,7 @@ CONVENTIONS = "CF-1.11"
 DIMENSIONLESS = frozenset(
     {
         "steps", "rejected", "periods_skipped", "section_count", "method_steps", "end_time", "drive_phase",
-        "section_time", "time", "transversal_exponent", "transversal_stderr", "rtol_used",
+        "section_time", "event_time", "event_count", "time", "transversal_exponent", "transversal_stderr", "rtol_used",
     }
 )  # fmt: skip
 """Variables with the unit "1" in every model: counts, non-dimensional times, and rates per non-dimensional time.

@@ -12,6 +12,7 @@ import xarray as xr
 
 from synchain.codegen.driver.columns import Count, PointColumn
 from synchain.codegen.machine_code.processor import processor, told_apart
+from synchain.models.dynamics.record import Record
 from synchain.models.inputs.checks import check_choice, check_instance
 from synchain.models.inputs.display import HasAnimation, HasPlot
 from synchain.models.scenes.scene import Scene, check_scene
@@ -384,6 +385,18 @@ class Result(_Deferred, HasAnimation, Labelled):
         names = tuple(str(each) for each, values in self.data.items() if values.dims[-2:] == STATE)
         return States.of(self.scene).flat(self.data[check_choice("variable of states", name, names)].values)
 
+    @property
+    def events(self) -> xr.Dataset:
+        """The recorded events: time, node and row of the node (from 1), mode of the row before and after.
+
+        Contacts and surfaces have the modes +1, -1 and, while held, 0; a stop is open (1) or closed (0); at a reset both
+        modes are 1.  Rows with NaN follow the last event of a cell.
+        """
+        names = [name for name in self.data.variables if str(name).startswith("event_")]
+        if not names:
+            raise ValueError("the result has no events; expected record = ('events',)")
+        return self.data[names]
+
     def belongs_to(self, scene: Scene) -> bool:
         """Return True if the scene equals the scene of this result, apart from the title."""
         return alike(self.scene, scene)
@@ -455,7 +468,7 @@ class Result(_Deferred, HasAnimation, Labelled):
             buffers.counts[:, Count.BY_METHOD : Count.BY_METHOD + by_method.shape[1]] = by_method
         for name, _, columns_of_observable in ObservableArrays(self.scene).columns():
             buffers.sums[:, columns_of_observable] = data[name].values.reshape(cells, -1)
-        if self.scene.sections:
+        if self.scene.sections or Record.EVENTS in self.scene.record:
             points = Sections(self.scene).points(cells, {str(name): data[name].values for name in data})
             buffers.counts[:, Count.POINTS] = np.isfinite(points[:, :, PointColumn.TIME]).sum(axis=1)
             put_points(points)
