@@ -184,6 +184,11 @@ def _contacts(
             raise ValueError(
                 f"set-valued contact: found the sliding velocity {sliding}; expected a linear function of velocities"
             )
+        if sp.simplify(sp.Add(*(a * b for a, b in zip(slopes, pull, strict=True)))) == 0:
+            raise ValueError(
+                f"set-valued contact: found the sliding velocity {sliding}, which does not feel its own friction; expected one "
+                "that it changes"
+            )
         felt = [v for v, e in zip(velocities, slopes, strict=True) if e != 0]
         k, w = f.args[1] if len(f.args) > 1 else None, sp.Dummy("w", real=True)
         static = static_coefficient(laws[k])

@@ -149,12 +149,6 @@ def with_rows(
         tuple(sp.factor_terms(-sp.Add(*(a * g for a, g in zip(gradient, push, strict=True)))) for push in inside)
         for gradient in gradients
     ]
-    for surface, level, row, k in zip(held, levels, stiffness, range(len(held)), strict=True):
-        if sp.simplify(row[k]) == 0:
-            raise ValueError(
-                f"{surface.law}: found the level {surface.level}, whose rate {'' if level == surface.level else 'of change '}"
-                "does not feel its own force; expected one that it changes"
-            )
     laws = [surface.law for surface in held]
     x = forces(laws, modes, stiffness, biases)
     answers = [

@@ -1,4 +1,4 @@
-"""Surfaces of a vector field along which motion can slide: the zeros of the arguments of signs in its rates.
+"""Surfaces of a vector field, the zeros of the arguments of signs in its rates, which motion crosses or slides along.
 
 Beside a surface h = 0 the rates are f+ and f-.  On the surface Filippov's convex rule takes f = (f+ + f-)/2 + x (f+ - f-)/2
 with the number x in [-1, 1] for which the motion stays there.  A function of one sign, such as exp(sign(h)), is written in
@@ -22,7 +22,7 @@ from .rows import Law, Surface
 
 
 def sliding_surfaces(state: Sequence[sp.Symbol], rates: Sequence[sp.Expr]) -> tuple[tuple[sp.Expr, ...], list[Surface]]:
-    """Return the rates without the signs along which motion can slide, and a surface for each of these signs."""
+    """Return the rates without the signs that become surfaces, and these surfaces."""
     plain = [e.replace(Piecewise, _by_sign) for e in rates]
     moving = set(state)
     signs = sorted({s for e in plain for s in e.atoms(sp.sign) if s.free_symbols & moving}, key=sp.default_sort_key)
@@ -36,10 +36,8 @@ def sliding_surfaces(state: Sequence[sp.Symbol], rates: Sequence[sp.Expr]) -> tu
         for sign, push in pushes.items()
         if sp.simplify(sp.Add(*(derivative(sign.args[0], x) * g for x, g in zip(state, push, strict=True)))) != 0
     ]
-    if not held:
-        raise ValueError(
-            "contact 'set-valued': found no sign in the rates along whose zero motion could slide; leave it out"
-        )
+    if not signs:
+        raise ValueError("contact 'set-valued': found no sign of states in the rates; leave it out")
     for sign in held:
         other = next((each for each in held if each is not sign and any(e.has(swap[each]) for e in pushes[sign])), None)
         if other is not None:
@@ -47,6 +45,15 @@ def sliding_surfaces(state: Sequence[sp.Symbol], rates: Sequence[sp.Expr]) -> tu
                 f"sliding along {sign.args[0]} = 0 and {other.args[0]} = 0 at once is not defined by {sign}*{other}; write a "
                 "sum, or contact='sign'"
             )
+    # a sign along which motion can only cross is a row as well, unless a product holds it
+    crossed = [
+        sign
+        for sign in signs
+        if sign not in held
+        and not any(e.has(swap[sign]) for push in pushes.values() for e in push)
+        and not any(e.has(*swap.values()) for e in pushes[sign])
+    ]
+    held += crossed
     for sign in held:
         s = swap[sign]
         smooth = [(e.xreplace({s: sp.S.One}) + e.xreplace({s: sp.S.NegativeOne})) / 2 for e in smooth]
