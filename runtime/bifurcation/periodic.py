@@ -265,10 +265,6 @@ def _cycle(scene: Scene, classes: tuple[int, ...], flow: Flow, state: np.ndarray
     """Follow an undriven motion to its attracting cycle."""
     values, size = scene.parameters, flow.size
     walker, rates = flow.motion(values, state)
-    if flow.equations.has_rows:
-        raise ValueError(
-            "periodic_orbit: found stops, resets, surfaces or several contacts without a drive; expected a drive with a period"
-        )
     turns = turns_of(walker, rates, drifts=not flow.equations.sticks)
     walker, left = flow.motion(values, state)[0], max(round(scene.transient), 0)
     while left > 0:

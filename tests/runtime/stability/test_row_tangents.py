@@ -91,6 +91,14 @@ def test_integrate_and_fire() -> None:
     assert multipliers(lone(cell, v=0.3)) == pytest.approx([0.548231306332175], abs=1e-12)
 
 
+def test_the_cycle_of_a_relay() -> None:
+    """Feedback of 1/(s + 1)**3 by a relay that the motion only crosses: multipliers by matrix exponentials in 40 digits."""
+    a, b, c = sp.symbols("a b c")
+    loop = sc.Field({a: -sp.sign(c) - a, b: a - b, c: b - c}, contact="set-valued")
+    found = multipliers(lone(loop, a=-0.7258679257978837, b=-0.2906309222293034, c=-0.3))
+    assert found == pytest.approx([1.089112220369835e-4, 0.1474487637037114, 1.0], abs=1e-11)
+
+
 def test_links_that_a_sliding_node_balances() -> None:
     """On x + c y = 0 a deviation decays as exp(-t/c), whatever the strength of links of y."""
     relay = sc.Field({X: V, V: -sp.sign(X + R(7, 10) * V) + sp.cos(T) / 10}, contact="set-valued")
