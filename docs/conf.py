@@ -56,12 +56,13 @@ html_theme_options = {"top_of_page_buttons": []}
 html_static_path = ["static"]
 html_logo = html_favicon = "static/logo.svg"
 html_css_files = ["site.css"]
+html_js_files = ["focus.js"]
 html_math_renderer = "mathml"
 html_copy_source = False
 html_show_sourcelink = False
 html_show_copyright = False
-pygments_style = "friendly"
-pygments_dark_style = "github-dark"
+pygments_style = "a11y-high-contrast-light"  # of accessible-pygments, which furo brings
+pygments_dark_style = "a11y-high-contrast-dark"
 
 # Reference
 autodoc_typehints = "none"  # the docstrings say types in words, with shapes and units
