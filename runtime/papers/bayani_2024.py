@@ -18,7 +18,8 @@ lorenz = sc.Field({"x": "10*(y - x)", "y": "x*(28 - z) - y", "z": "x*y - 2*z"}, 
 group = [1, 1, 1, 2, 2, 2, 3, 3, 3, 3]
 weight = {(1, 1): 0.1, (1, 2): 0.1, (1, 3): 0.1, (2, 2): 0.529, (2, 3): 0.529, (3, 3): 1.029}
 network = sc.graphs.from_edges([(i + 1, j + 1, weight[group[i], group[j]]) for j in range(10) for i in range(j)])
-sequence = sc.transition(sc.Scene(lorenz, "x->x", network, parameters={"sigma": 4}, time_unit="time"))
+scene = sc.Scene(lorenz, "x->x", network, parameters={"sigma": 4}, time_unit="time")
+sequence = sc.transition(scene, starts=1)
 found = [step.strength for step in sequence.steps]
 confirmed = sequence.verify(0.15).verdicts.count("confirmed")
 
