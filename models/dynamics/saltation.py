@@ -181,8 +181,8 @@ def check_tangents(equations: Equations) -> None:
     if equations.has_rows and equations.n > 1:
         raise ValueError(
             "tangent dynamics of a network: found contacts of several coordinates, moving grounds or kinds, stops, resets or "
-            "surfaces; expected one node, or friction of one coordinate on a ground of constant velocity; take the modes of "
-            "the synchronous motion, msf or exponents"
+            "surfaces; expected one node, or friction of one coordinate on a ground of constant velocity; take "
+            "scene.lone, or modes of the synchronous motion by msf or exponents"
         )
 
 

@@ -417,8 +417,16 @@ def orbits_of(
     problem = OrbitProblem.of_modes(scene, strengths, first[None], averaging.execution.size)
     if starts > 1 and not problem.linear:
         problem = problem.observed(problem.with_slip_states(first[None])[0])
-    # further starts are copies, displaced by at most REACH extents
-    return problem, problem.with_slip_states(starts_near(first, problem.extent[: len(first)], starts, averaging.seed))
+    # further starts are copies, displaced by at most REACH extents; a copy behind a stop or a guard comes nearer
+    copies = starts_near(first, problem.extent[: len(first)], starts, averaging.seed)
+    while problem.variation.orbit.has_rows:
+        try:
+            return problem, problem.with_slip_states(copies)
+        except ValueError:
+            if np.array_equal(copies, np.tile(first, (starts, 1))):
+                raise
+            copies = 0.5 * (copies + first)
+    return problem, problem.with_slip_states(copies)
 
 
 def along(

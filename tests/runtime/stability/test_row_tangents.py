@@ -47,6 +47,18 @@ def test_impact_oscillators_in_a_ring() -> None:
     assert found == pytest.approx([-0.095413264323899, -0.095413264323899, -0.086012350043361], abs=1e-12)
 
 
+def test_starts_behind_a_stop_come_nearer() -> None:
+    """x'' = -x + cos(5t/2), stop at 0: multipliers of a mode by hand; copies of the start lie behind the stop."""
+    w, e, alpha, T_ = 2.5, 0.8, np.array([0.0, 1.0, 3.0]), 2 * np.pi / 2.5
+    node = sc.Lagrangian(V**2 / 2, X**2 / 2, {X: sp.cos(R(5, 2) * T)}, coordinates={X: V}, events=[sc.Stop(X, R(4, 5))])
+    psi = np.arctan(-np.tan(T_ / 2) * (1 - e) / (w * (1 + e)))
+    speed, turn = (np.tan(T_ / 2) * np.cos(psi) - w * np.sin(psi)) / (1 - w**2), np.sqrt(1 + alpha)
+    both = -2 * e * np.cos(turn * T_) + (1 + e) * np.cos(psi) * np.sin(turn * T_) / (turn * speed)
+    exact = [np.log(np.abs(np.roots([1, -each, e**2])).max()) / T_ for each in both]
+    found = sc.exponents(ring(node, "spring", x=0.001, v=0.6), alpha, starts=4)
+    assert found.exponent == pytest.approx(exact, abs=1e-7)
+
+
 def test_a_ball_on_a_shaken_table() -> None:
     """The derivative of the flight map: a pair of multipliers with the product e**2."""
     phase, late = 0.1249440531877598, sp.Symbol("late")
