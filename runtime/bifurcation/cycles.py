@@ -68,7 +68,13 @@ BORN = 1e-3
 birth is located to the square root of rounding (a choice)."""
 
 NEAR = 1e-3
-"""A gap, in units of the motion, from which Newton's method must reduce it in every step (a choice)."""
+"""A gap, in units of the motion, from which Newton's method must reduce it in every step under friction (a choice)."""
+
+CLOSE = 1e-9
+"""A gap, in units of the motion, at which a step of Newton's method is not halved (a choice)."""
+
+SMALLEST_SHARE = 1.0 / 64.0
+"""Smallest part of a step of Newton's method that is tried where the whole does not reduce the gap (a choice)."""
 
 REAL = 1e-7
 """Multipliers with a smaller imaginary part, relative to their modulus, count as real."""
@@ -356,31 +362,35 @@ class Cycles:
     def solved(self) -> tuple[np.ndarray, float, int]:
         """Solve by Newton's method with the parameters fixed: the best point, its largest gap and the number of steps.
 
+        A step that does not reduce the gap is halved; set-valued friction takes full steps, as its gap has kinks.
         Where the matrix is singular, as of conservative motions, the step of least length is taken.
         """
         q, n = len(self.names), self.phase.shape[1]
-        z, best, steps = self.point, math.inf, 0
+        z, best, steps, share = self.point, math.inf, 0, 1.0
         nearest, left, weights = z, math.inf, self.weights[: len(z) - q]
+        step, sticks = np.zeros(len(weights)), self.flow.equations.sticks
         sizes = np.append(np.tile(self.scale, self.segments), np.ones(len(weights) - self.phase.size))
         while steps < MOST_STEPS:
             try:
                 residual, matrix = self.linearise(z)
+                size = float(np.abs(residual / sizes).max())
             except ArithmeticError:
                 if math.isinf(left):
                     raise
-                break  # the last correction led too far away
-            size = float(np.abs(residual / sizes).max())
-            # Stop where the gap no longer falls: it is that of the integration, or Newton's method diverges.
-            if not size < (best if best < NEAR else 10.0 * best):
-                break
+                size = math.inf
+            if not size < (10.0 * best if sticks and best > NEAR else best):
+                # A small gap that no longer falls is that of the integration; a large one is left by too long a step.
+                share *= 0.5
+                if sticks or best < CLOSE or share < SMALLEST_SHARE:
+                    break
+                z = np.append(nearest[: len(weights)] + share * step, z[len(weights) :])
+                continue
             if size < best:
                 nearest, best, left = z, size, float(np.abs(residual[: self.phase.size]).max())
-            image = self._image(z)[0]
+            image, share = self._image(z)[0], 1.0
             if left == 0.0:
                 break
-            if self.flow.equations.sticks and np.array_equal(
-                image.propagators[0], np.diag([1.0, 0.0] if n == 2 else [0.0] * n)
-            ):
+            if sticks and np.array_equal(image.propagators[0], np.diag([1.0, 0.0] if n == 2 else [0.0] * n)):
                 # The ground carries the body along: follow the motion until the body slips.
                 z, best = np.append(image.states[0], z[n:]), math.inf
             else:

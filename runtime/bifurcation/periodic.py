@@ -49,6 +49,9 @@ NEWTON = {
 CLOSED = 1e-9
 """Largest distance of the state of an orbit from its image, relative to the extent of each state (a choice)."""
 
+SEGMENTS = 4
+"""Segments of an undriven orbit that is looked for near a start and a period (a choice)."""
+
 REST = 1e-9
 """A motion rests if its rates are below their change over this part of its extent (a choice)."""
 
@@ -165,7 +168,10 @@ def periodic_orbit(
             )
         if period is not None:
             length = check_number("period", period, 0.0)
-            problem = Cycles.near(scene, (), classes, state[None], length, 0)
+            # Segments bend the orbit less, so that Newton's method comes from further away; a body may stick in one.
+            parts = np.arange(1 if equations.sticks else SEGMENTS) * length / SEGMENTS
+            states = np.vstack([state, flow.advance(scene.parameters, np.tile(state, (len(parts) - 1, 1)), parts[1:])])
+            problem = Cycles.near(scene, (), classes, states, length, 0)
             z, gap, steps = problem.solved()
             if not _accepted(problem, z):
                 raise ArithmeticError(

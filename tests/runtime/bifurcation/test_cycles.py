@@ -236,6 +236,21 @@ def test_the_unstable_cycles_of_lorenz_are_born_at_its_hopf_point() -> None:
         assert not orbit.stable
 
 
+LORENZ = sc.Field({"x": "10*(y - x)", "y": "x*(r - z) - y", "z": "x*y - 8*z/3"}, parameters={"r": 24})
+
+
+def test_newtons_method_reaches_the_unstable_cycle_of_lorenz_from_afar() -> None:
+    """Full steps from this start lead away; shorter ones reach the cycle (F), on several segments and on one."""
+    scene, start = sc.Scene(LORENZ), np.array([7.0, 7.0, 19.0])
+    orbit = sc.periodic_orbit(scene, start=start, period=0.68)
+    assert orbit.period == pytest.approx(0.679336764198, abs=2e-12)
+    assert orbit.multipliers[0].real == pytest.approx(1.03208829783, abs=1e-9)
+    single = Cycles.near(scene, (), (0,), start[None], 0.68, 0)
+    z, gap, _ = single.solved()
+    assert single.period(z) == pytest.approx(0.679336764198, abs=2e-12)
+    assert gap < 1e-12
+
+
 def test_period_doublings_of_rossler_are_followed_both_ways() -> None:
     """(F)"""
     node = sc.Field({"x": "-y - z", "y": "x + y/5", "z": "1/5 + z*(x - c)"}, parameters={"c": 2.5})
