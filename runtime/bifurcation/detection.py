@@ -26,7 +26,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.optimize import brentq
 
-from .arclength import Point, correct
+from .arclength import ANGLE, Point, correct
 from .kinds import BifurcationKind
 from .problems import Critical, Problem
 
@@ -82,7 +82,12 @@ class Step:
     def at(self, distance: float) -> Point:
         """Return the solution at a distance; ArithmeticError if Newton's method fails."""
         if distance not in self.points:
-            guess = self.before.z + distance * self.before.tangent
+            one, other, h = self.before, self.after, self.length
+            guess, s = one.z + distance * one.tangent, distance / h
+            cosine = float((self.problem.weights**2 * other.tangent) @ one.tangent)
+            if cosine > ANGLE:  # the cubic through both ends with their tangents stays on the hyperplanes
+                ends = h * one.tangent, other.z - one.z, h / cosine * other.tangent
+                guess = one.z + s * ends[1] + s * (1 - s) * ((1 - s) * (ends[0] - ends[1]) + s * (ends[1] - ends[2]))
             point = correct(self.problem, guess, self.before.tangent)
             if point is None:
                 raise ArithmeticError("no solution between two solutions of a branch")
@@ -128,10 +133,16 @@ def bifurcations(problem: Problem, before: Point, after: Point, length: float) -
     if counts[0] == counts[1] and not turned:
         return []
     try:
-        turn = step.zero(lambda point: float(point.tangent[-1])) if turned else None
-        located = [*_passing(step, range(*counts), turn)]
+        return _found(step, range(*counts), turned)
     except ArithmeticError:
         return None
+
+
+def _found(step: Step, indices: range, turned: bool) -> list[tuple[float, object]] | None:
+    """Return the bifurcations of the critical values that pass on a step, and that of its turn."""
+    problem, length = step.problem, step.length
+    turn = step.zero(lambda point: float(point.tangent[-1])) if turned else None
+    located = [*_passing(step, indices, turn)]
     if turn is not None and not any(each.kind is BifurcationKind.FOLD for _, each in located):
         critical = _critical(step.at(turn))
         touching = int(abs(critical.growth).argmin())

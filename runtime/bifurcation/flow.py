@@ -137,14 +137,16 @@ class LiftedFlow:
         """Integrate a lane for each column of each propagator, and one for each parameter."""
         (m, n), q = states.shape, len(self.present)
         # A deviation of the size of the motion, so that all tolerances are relative to the same scale.
-        deviations = np.tile(np.vstack([np.diag(scale), np.zeros((q, n))]), (m, 1))
-        sizes = np.array([abs(values[name]) or 1.0 for name in self.present])
-        seeds = np.tile(np.vstack([np.zeros((n, q)), np.diag(sizes)]), (m, 1))
-        both = self._run(values, np.repeat(states, n + q, axis=0), deviations, seeds, np.repeat(times, n + q), scale)
+        sizes = np.append(scale, [abs(values[name]) or 1.0 for name in self.present])
+        lanes = np.zeros((m, n + q, n + q))
+        lanes[:, np.arange(n + q), np.arange(n + q)] = sizes
+        lanes = lanes.reshape(m * (n + q), n + q)
+        both = self._run(values, states.repeat(n + q, axis=0), lanes[:, :n], lanes[:, n:], times.repeat(n + q), scale)
         images, moved = (part.reshape(m, n + q, n) for part in both)
-        matrices = (moved / np.append(scale, sizes)[:, None]).transpose(0, 2, 1)
+        matrices = (moved / sizes[:, None]).transpose(0, 2, 1)
         columns = np.zeros((m, n, len(self.names)))
-        columns[:, :, [self.names.index(name) for name in self.present]] = matrices[:, :, n:]
+        for k, name in enumerate(self.present):
+            columns[:, :, self.names.index(name)] = matrices[:, :, n + k]
         return Image(images[:, 0], matrices[:, :, :n], columns)
 
     def _run(
