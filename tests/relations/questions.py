@@ -192,16 +192,23 @@ def _orbit_of_drive(units: Units, change: Change) -> tuple[sc.Scene, sc.results.
     return scene, sc.periodic_orbit(scene)
 
 
+def _at_values(branch: sc.results.Branch) -> np.ndarray:
+    """Return the states at the values that were asked for; the steps between them may depend on the units."""
+    states = [orbit.state for value, orbit in zip(branch.values, branch.orbits, strict=True) if value in (1.2, 1.25)]
+    assert len(states) == 2
+    return np.array(states)
+
+
 def of_follow(units: Units, change: Change, path: Path) -> Answer:
     _, first = _orbit_of_drive(units, change)
     branch = sc.follow(first, "w", values=[1.2, 1.25])
-    return {"states": units.take(np.array([orbit.state for orbit in branch.orbits]).T)}
+    return {"states": units.take(_at_values(branch).T)}
 
 
 def of_skeleton(units: Units, change: Change, path: Path) -> Answer:
     result = sc.skeleton(change(driven(units)), "w", [1.2, 1.25], (1,), 1, **QUIET)
-    states = [orbit.state for branch in result for orbit in branch.orbits]
-    return {"branches": np.array(len(result), float), "states": units.take(np.array(states).T)}
+    states = np.vstack([_at_values(branch) for branch in result])
+    return {"branches": np.array(len(result), float), "states": units.take(states.T)}
 
 
 ASKED: dict[str, Callable[[Units, Change, Path], Answer]] = {
