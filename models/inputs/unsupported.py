@@ -1,4 +1,4 @@
-"""Keyword -> feature in the literature that this program lacks, with programs that have the feature."""
+"""Keyword -> feature in the literature that this program lacks, or writes in another way."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from collections.abc import Mapping
 
 _DELAYS = "delays are not supported; JiTCDDE and DifferentialEquations.jl (DDEProblem) integrate them"
 _NOISE = "noise is not supported; JiTCSDE and DifferentialEquations.jl (SDEProblem) integrate it"
-_RESETS = "resets of the state are not supported; Brian 2 and callbacks of DifferentialEquations.jl have them"
+_RESETS = "resets are events of an oscillator; write Field(…, events=[Reset(guard, {state: value})])"
 _CONSTRAINTS = "constraints are not supported; take coordinates without them, or a solver of DAEs such as SUNDIALS IDA"
-_TRIADS = "links of more than two nodes are not supported; XGI holds such networks, SciPy integrates them"
+_TRIADS = (
+    "links of three nodes are rates or potentials of `i, j, k, W = ends(node, 3)` on a graph of `graphs.triangles`"
+)
 _MAPS = "maps are not supported, time is continuous; DynamicalSystems.jl iterates them"
 _SUMS = (
     "a function of the sum of inputs is not supported, what links add is summed; docs/links.md writes S(sum of W*x_j) "

@@ -176,7 +176,7 @@ class MSF(Labelled):
         """Whether the network can synchronise for some sigma > 0; GRID_ENDS if a longer grid may change the answer."""
         on_grid = verdict(self.intervals, self.scene.topology, self.errors)
         first, last = self.fine.alpha[[0, -1]]
-        longer = [(0.0 if a == first else a, math.inf if b == last else b) for a, b in self.intervals]
+        longer = [(min(a, 0.0) if a == first else a, math.inf if b == last else b) for a, b in self.intervals]
         same = verdict(longer, self.scene.topology, self.errors).answer == on_grid.answer
         return on_grid if same else replace(on_grid, answer=Answer.GRID_ENDS)
 

@@ -17,8 +17,8 @@ PAIR = sc.Scene("van_der_pol", "x->x", sc.graphs.chain(2))
     [
         (lambda: sc.Scene(delay=1), "delays are not supported; JiTCDDE"),
         (lambda: PAIR.replace(noise=0.1), "noise is not supported; JiTCSDE"),
-        (lambda: sc.run(PAIR, resets=1), "resets of the state are not supported; Brian 2"),
-        (lambda: sc.Scene.from_dict({"triads": 1}), "links of more than two nodes are not supported; XGI"),
+        (lambda: sc.run(PAIR, resets=1), "resets are events of an oscillator; write Field"),
+        (lambda: sc.Scene.from_dict({"triads": 1}), "links of three nodes are rates or potentials"),
         (lambda: sc.Scene(parameters={"delay": 1}), "delays are not supported"),
         (lambda: sc.equilibrium(PAIR, maps=1), "maps are not supported"),
         (lambda: sc.Rates({"x": "tanh(sum(W*x_j))"}), "a function of the sum of inputs is not supported"),

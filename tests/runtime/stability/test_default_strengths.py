@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from synchain import Scene, msf
-from synchain.graphs import chain
+from synchain.graphs import chain, ring
 from synchain.models.scenes.file import load_scene
 from synchain.runtime.cli import main
 from synchain.runtime.stability.msf import default_strengths
@@ -45,3 +45,12 @@ def test_the_command_takes_the_same(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["msf", "figure_8", "--periods", "1", "--starts", "1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["alpha"] == default_strengths(load_scene("figure_8")).tolist()
     assert default_strengths(load_scene("figure_8"))[-1] == 1.2
+
+
+def test_a_range_that_ends_at_zero_has_a_verdict() -> None:
+    """FitzHugh-Nagumo through y is negative up to alpha = 0, where the exponent is 0 to its error."""
+    scene = Scene("fitzhugh_nagumo", "y->x", ring(4), transient=100, window=10)
+    function = msf(scene, np.linspace(-1.0, 3.0, 41), starts=1, periods=100, show_progress=False)
+    assert function.intervals[0][0] == -1.0
+    assert abs(function.intervals[0][1]) < 1e-5
+    assert str(function.verdict)
