@@ -160,10 +160,10 @@ def _irreducible(
     for order, element in enumerate(_elements(generators)):
         choices += [(times, f.degree(), order, element, f) for f, times in element.charpoly().factor()[1]]
     times, _, _, element, f = min(choices, key=lambda choice: choice[:3])
-    field_ = _Field(f)
+    field_ = _NumberField(f)
     start = field_.eigenvector(element, _null_rows(element, f))
     if times == 1 and f.degree() > 1 and _rank_modulo_prime(generators, start, f) == size:
-        field_, start = _Field(fmpq_poly([0, 1])), [fmpq_poly([int(k == 0)]) for k in range(size)]
+        field_, start = _NumberField(fmpq_poly([0, 1])), [fmpq_poly([int(k == 0)]) for k in range(size)]
     space = field_.span(start, [g for generator in generators for g in generator.both])
     matrices = [field_.restricted(generator.matrix, space) for generator in generators[:count]]
     dimension = len(space)
@@ -233,7 +233,7 @@ def _exact(polynomial: Polynomial, root: RealRoot | None) -> Exact:
     return FieldNumber(coefficients, root)
 
 
-class _Field:
+class _NumberField:
     """The field Q(θ) of a root θ of an irreducible polynomial, with the linear algebra that subspaces need."""
 
     def __init__(self, polynomial: fmpq_poly) -> None:

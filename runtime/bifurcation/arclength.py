@@ -25,7 +25,7 @@ from scipy import sparse
 from scipy.linalg import lapack
 from scipy.sparse.linalg import splu
 
-from .problems import Critical, Matrix, Problem
+from .problems import BranchProblem, GrowthNumbers, Matrix
 
 MOST_CORRECTIONS = 12
 """Most corrections of a step (a choice)."""
@@ -66,7 +66,7 @@ class Point:
     z: np.ndarray  # (size + 1,)
     tangent: np.ndarray  # (size + 1,): of length 1 in the metric of its problem
     corrections: int
-    critical: Critical | None = None
+    critical: GrowthNumbers | None = None
     length: float = 0.0  # arclength from the first solution
 
     @property
@@ -75,7 +75,7 @@ class Point:
         return float(self.z[-1])
 
 
-class Factors:
+class BorderedFactors:
     """The LU factors of a matrix (size, size + 1) without one column; a singular matrix raises ArithmeticError."""
 
     def __init__(self, matrix: Matrix, column: int) -> None:
@@ -105,7 +105,7 @@ class Factors:
         return np.insert(-self._solve(self.right), self.column, 1.0)
 
 
-def correct(problem: Problem, guess: np.ndarray, tangent: np.ndarray) -> Point | None:
+def correct(problem: BranchProblem, guess: np.ndarray, tangent: np.ndarray) -> Point | None:
     """Solve a problem on the hyperplane through `guess` normal to `tangent`; None if Newton's method fails.
 
     A tangent with a single entry keeps that unknown fixed.
@@ -122,7 +122,7 @@ def correct(problem: Problem, guess: np.ndarray, tangent: np.ndarray) -> Point |
         noise = problem.noise(z) * (STALLED if stalled else 1.0)
         solved = last < CLOSE or bool(np.all(np.abs(residual) <= noise))
         try:
-            factors = Factors(matrix, column)
+            factors = BorderedFactors(matrix, column)
             null = factors.null()
             if not np.isfinite(null).all() or row @ null == 0.0:
                 raise ArithmeticError("the tangent is not determined")
@@ -140,7 +140,7 @@ def correct(problem: Problem, guess: np.ndarray, tangent: np.ndarray) -> Point |
     return None
 
 
-def at_value(problem: Problem, guess: np.ndarray, place: int = -1) -> Point | None:
+def at_value(problem: BranchProblem, guess: np.ndarray, place: int = -1) -> Point | None:
     """Solve a problem with one unknown fixed to its value in `guess`, by default the parameter."""
     fixed = np.zeros(len(guess))
     fixed[place] = 1.0 / problem.weights[place]
@@ -158,11 +158,11 @@ class Limits:
     values: Sequence[float] = ()  # values of the parameter at which solutions are added
 
 
-Events = Callable[[Problem, Point, Point, float], "list[tuple[float, object]] | None"]
+Events = Callable[[BranchProblem, Point, Point, float], "list[tuple[float, object]] | None"]
 """Bifurcations on a step (problem, before, after, length), each with its length from `before`; None: halve the step."""
 
 
-def walk(problem: Problem, first: Point, limits: Limits, events: Events) -> Generator[object, None, str]:
+def walk(problem: BranchProblem, first: Point, limits: Limits, events: Events) -> Generator[object, None, str]:
     """Yield solutions and bifurcations along a branch from a first solution; returns how the branch ends.
 
     A bifurcation is what `events` returns. Nothing is looked for on the first step if `first` has no critical values.
@@ -188,7 +188,7 @@ def walk(problem: Problem, first: Point, limits: Limits, events: Events) -> Gene
 
 
 def _advance(
-    problem: Problem, before: Point, step: float, limits: Limits, events: Events
+    problem: BranchProblem, before: Point, step: float, limits: Limits, events: Events
 ) -> tuple[Point, list[tuple[float, object]], float, str] | None:
     """Take one step: the next solution, the bifurcations on the step, its length and how the branch ends there."""
     while step >= SHORTEST:
@@ -239,7 +239,7 @@ def _passed(z: np.ndarray, bounds: Sequence[tuple[float, float]]) -> tuple[int, 
 
 
 def _at_values(
-    problem: Problem, before: Point, after: Point, length: float, limits: Limits
+    problem: BranchProblem, before: Point, after: Point, length: float, limits: Limits
 ) -> Iterator[tuple[float, Point]]:
     """Yield the solutions at requested values between two solutions, with their lengths from the first."""
     low, high = sorted((before.value, after.value))

@@ -17,10 +17,10 @@ from scipy.optimize import brentq, linear_sum_assignment
 
 from .arclength import Point
 from .cycles import Cycles
-from .detection import Step, bifurcations
+from .detection import BranchStep, bifurcations
 from .kinds import BifurcationKind
 from .phases import Phases, phases_of
-from .problems import Problem
+from .problems import BranchProblem
 
 APART = 1.0 / 64.0
 """Longest step on which a change of phases is located; two changes on one count as one (a choice)."""
@@ -38,7 +38,7 @@ leads to another branch shows in the multipliers."""
 
 
 def cycle_bifurcations(
-    problem: Problem, before: Point, after: Point, length: float
+    problem: BranchProblem, before: Point, after: Point, length: float
 ) -> list[tuple[float, object]] | None:
     """Return the smooth bifurcations on a step of a branch of cycles; None if the step is too long."""
     if before.critical is None or after.critical is None:
@@ -80,7 +80,7 @@ class Corners:
         return self.known[key]
 
     def __call__(
-        self, problem: Problem, before: Point, after: Point, length: float
+        self, problem: BranchProblem, before: Point, after: Point, length: float
     ) -> list[tuple[float, object]] | None:
         """Return the bifurcations on a step with their distances from its beginning; None if the step is too long."""
         one, other = self.phases(before), self.phases(after)
@@ -88,7 +88,7 @@ class Corners:
             return cycle_bifurcations(problem, before, after, length)
         if length > APART:
             return None
-        step = Step(problem, before, after, length)
+        step = BranchStep(problem, before, after, length)
         try:
             corner, near, far = self._located(step, one, other)
         except ArithmeticError:
@@ -99,7 +99,7 @@ class Corners:
             return None
         return [*first, (near, corner), *((far + h, each) for h, each in second)]
 
-    def _located(self, step: Step, one: Phases, other: Phases) -> tuple[Corner, float, float]:
+    def _located(self, step: BranchStep, one: Phases, other: Phases) -> tuple[Corner, float, float]:
         """Return the change of phases, and the nearest distances on both sides of it."""
         if _same_slips(one, other) and one.landing * other.landing < 0.0:
             at = float(brentq(lambda h: self.phases(step.at(h)).landing, 0.0, step.length, xtol=1e-14 * step.length))

@@ -34,13 +34,13 @@ from scipy import sparse
 from synchain.models.inputs.checks import check_keys, check_table, listed
 
 from .arclength import FIRST_STEP, LARGEST_STEP, MOST, Limits, Point, correct, walk
-from .detection import REAL, Step
+from .detection import REAL, BranchStep
 from .equilibria import Equilibria
 from .equilibrium import Equilibrium, resting_equations
 from .kinds import BifurcationKind
 from .linearised import Linearised
 from .normal_forms import first_lyapunov_coefficient
-from .problems import Critical, Matrix, Problem
+from .problems import BranchProblem, GrowthNumbers, Matrix
 from .results import Bifurcation, Curve, CurvePoint, digits_of
 
 Test = Callable[[Point], float]
@@ -106,13 +106,13 @@ class EigenvectorCurve:
         both = np.append(state, vector)
         return network.at(values).jacobian(both), [each.at(values).rates(both) for each in by_parameters]
 
-    def others(self, z: np.ndarray, taken: list[complex]) -> Critical:
+    def others(self, z: np.ndarray, taken: list[complex]) -> GrowthNumbers:
         """Return the eigenvalues without those that are critical on the whole curve."""
         critical = self.base.critical(self.equilibrium(z))
         kept = np.arange(len(critical.values))
         for value in taken:
             kept = np.delete(kept, np.abs(critical.values[kept] - value).argmin())
-        return Critical(critical.growth[kept], critical.values[kept], critical.blocks[kept])
+        return GrowthNumbers(critical.growth[kept], critical.values[kept], critical.blocks[kept])
 
     def frequency_at(self, point: Point) -> float:
         """Return the frequency of a Hopf point, 0 of a fold."""
@@ -155,7 +155,7 @@ class FoldCurve(EigenvectorCurve):
         sizes = abs(matrix[:, : self.size]) @ np.abs(z[self.size : 2 * self.size])
         return np.concatenate([self.base.noise(self.equilibrium(z)), NOISE * sizes, [NOISE]])
 
-    def critical(self, z: np.ndarray) -> Critical:
+    def critical(self, z: np.ndarray) -> GrowthNumbers:
         """Return the eigenvalues but zero."""
         return self.others(z, [0.0])
 
@@ -235,7 +235,7 @@ class HopfCurve(EigenvectorCurve):
         sizes = np.concatenate([jacobian @ a + u, jacobian @ u + abs(z[-3]) * a])
         return np.concatenate([self.base.noise(self.equilibrium(z)), NOISE * sizes, [NOISE, NOISE * scale]])
 
-    def critical(self, z: np.ndarray) -> Critical:
+    def critical(self, z: np.ndarray) -> GrowthNumbers:
         """Return the eigenvalues but the pair on the imaginary axis, or the neutral pair of a saddle."""
         root = np.emath.sqrt(-z[-3])
         return self.others(z, [root, -root])
@@ -261,17 +261,19 @@ def _small_dense(matrix: sparse.csc_array) -> Matrix:
     return matrix.toarray() if matrix.shape[0] <= 200 else sparse.csc_array(matrix)
 
 
-def codimension_two(problem: Problem, before: Point, after: Point, length: float) -> list[tuple[float, object]] | None:
+def codimension_two(
+    problem: BranchProblem, before: Point, after: Point, length: float
+) -> list[tuple[float, object]] | None:
     """Return the points of codimension two on a step of a curve with their distances; None if it is too long."""
     if not isinstance(problem, FoldCurve | HopfCurve):
         raise TypeError("points of codimension two belong to curves")
     try:
-        return sorted(_points(problem, Step(problem, before, after, length)), key=lambda pair: pair[0])
+        return sorted(_points(problem, BranchStep(problem, before, after, length)), key=lambda pair: pair[0])
     except ArithmeticError:
         return None
 
 
-def _points(problem: FoldCurve | HopfCurve, step: Step) -> Iterator[tuple[float, CurvePoint]]:
+def _points(problem: FoldCurve | HopfCurve, step: BranchStep) -> Iterator[tuple[float, CurvePoint]]:
     """Yield the points of codimension two, and those at which a parameter is extreme, in any order."""
 
     def point(kind: str, distance: float) -> tuple[float, CurvePoint]:

@@ -41,7 +41,7 @@ from .equilibrium import Equilibrium
 from .flow import TOLERANCE, Flow, Image, flow_of
 from .kinds import BifurcationKind
 from .periodic_result import PeriodicOrbit, sorted_by_size
-from .problems import Critical
+from .problems import GrowthNumbers
 from .products import null_vectors, product_eigenvalues
 from .transversal import Transversal, expansion
 
@@ -434,14 +434,14 @@ class Cycles:
         )  # fmt: skip
 
     # --- stability ---
-    def critical(self, z: np.ndarray) -> Critical:
+    def critical(self, z: np.ndarray) -> GrowthNumbers:
         """Return all multipliers but those of the motion itself and of the shifts."""
         along = self.multipliers(z)
         blocks = np.full(len(along), -1)
         if self.transversal is not None:
             across, of = self.transversal.multipliers(self.values(z), self.states(z), self.period(z), self.scale)
             along, blocks = np.concatenate([along, across]), np.concatenate([blocks, of])
-        return Critical.of(np.abs(along) - 1.0, along, blocks)
+        return GrowthNumbers.of(np.abs(along) - 1.0, along, blocks)
 
     def multipliers(self, z: np.ndarray) -> np.ndarray:
         """Return the multipliers along the quotient, without those of the motion itself and of the shifts."""

@@ -28,7 +28,7 @@ from scipy.optimize import brentq
 
 from .arclength import ANGLE, Point, correct
 from .kinds import BifurcationKind
-from .problems import Critical, Problem
+from .problems import BranchProblem, GrowthNumbers
 
 TOGETHER = 1e-8
 """Bifurcations nearer than this part of a step are one of higher multiplicity, or lie on a turn (a choice)."""
@@ -65,17 +65,17 @@ class Located:
         return value if abs(value.imag) > REAL * critical.scale else complex(value.real)
 
 
-def _critical(point: Point) -> Critical:
+def _critical(point: Point) -> GrowthNumbers:
     """Return the critical values of a solution that has some."""
     if point.critical is None:
         raise RuntimeError("critical values were not computed")
     return point.critical
 
 
-class Step:
+class BranchStep:
     """The solutions on the hyperplanes between both ends of a step, by their distance from its beginning."""
 
-    def __init__(self, problem: Problem, before: Point, after: Point, length: float) -> None:
+    def __init__(self, problem: BranchProblem, before: Point, after: Point, length: float) -> None:
         self.problem, self.before, self.after, self.length = problem, before, after, length
         self.points = {0.0: before, length: after}
 
@@ -125,9 +125,11 @@ class Step:
         )
 
 
-def bifurcations(problem: Problem, before: Point, after: Point, length: float) -> list[tuple[float, object]] | None:
+def bifurcations(
+    problem: BranchProblem, before: Point, after: Point, length: float
+) -> list[tuple[float, object]] | None:
     """Return the bifurcations on a step with their distances from its beginning; None if the step is too long."""
-    step = Step(problem, before, after, length)
+    step = BranchStep(problem, before, after, length)
     turned = before.tangent[-1] * after.tangent[-1] < 0.0
     counts = sorted((_critical(before).growing, _critical(after).growing))
     if counts[0] == counts[1] and not turned:
@@ -138,7 +140,7 @@ def bifurcations(problem: Problem, before: Point, after: Point, length: float) -
         return None
 
 
-def _found(step: Step, indices: range, turned: bool) -> list[tuple[float, object]] | None:
+def _found(step: BranchStep, indices: range, turned: bool) -> list[tuple[float, object]] | None:
     """Return the bifurcations of the critical values that pass on a step, and that of its turn."""
     problem, length = step.problem, step.length
     turn = step.zero(lambda point: float(point.tangent[-1])) if turned else None
@@ -169,7 +171,7 @@ def _nearest(point: Point) -> float:
     return float(growth[abs(growth).argmin()])
 
 
-def _passing(step: Step, indices: range, turn: float | None) -> Iterator[tuple[float, Located]]:
+def _passing(step: BranchStep, indices: range, turn: float | None) -> Iterator[tuple[float, Located]]:
     """Yield a bifurcation for each critical value, or pair of values, that passes on a step."""
     index = indices.start
     while index < indices.stop:

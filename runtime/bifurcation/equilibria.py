@@ -24,7 +24,7 @@ from .eigenvalues import ModeBlocks, eigenvalues
 from .equilibrium import Equilibrium
 from .kinds import BifurcationKind
 from .linearised import Linearised
-from .problems import Critical, Matrix
+from .problems import GrowthNumbers, Matrix
 
 NOISE = 1e-14
 """Residual that counts as zero, relative to the sizes of its terms: 45 rounding errors (a choice)."""
@@ -140,7 +140,7 @@ class Equilibria:
         self._weigh()
         return z, tangent / float(np.linalg.norm(self.weights * tangent))
 
-    def critical(self, z: np.ndarray) -> Critical:
+    def critical(self, z: np.ndarray) -> GrowthNumbers:
         """Return the eigenvalues of M^-1 J without those of the shifts."""
         state, _, values = self.split(z)
         network = self.network.at(values)
@@ -150,7 +150,7 @@ class Equilibria:
         if self.shifts:
             others = np.argsort(np.abs(numbers), kind="stable")[len(self.shifts) :]
             numbers, modes = numbers[others], None if modes is None else modes[others]
-        return Critical.of(numbers.real, numbers, modes)
+        return GrowthNumbers.of(numbers.real, numbers, modes)
 
     def kind(self, value: complex, turned: bool) -> BifurcationKind:
         """Name a bifurcation by its eigenvalue."""

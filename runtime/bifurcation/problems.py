@@ -16,7 +16,7 @@ from .kinds import BifurcationKind
 Matrix: TypeAlias = np.ndarray | sparse.csc_array
 
 
-class Critical(NamedTuple):
+class GrowthNumbers(NamedTuple):
     """Eigenvalues or multipliers of a solution that decide its stability, without those that are always neutral."""
 
     growth: np.ndarray  # (k,): distance past neutrality, real part or |multiplier| - 1; the largest first
@@ -24,7 +24,7 @@ class Critical(NamedTuple):
     blocks: np.ndarray  # (k,): index of the mode of the graph; -1 if a value belongs to the whole network
 
     @classmethod
-    def of(cls, growth: np.ndarray, values: np.ndarray, blocks: np.ndarray | None = None) -> Critical:
+    def of(cls, growth: np.ndarray, values: np.ndarray, blocks: np.ndarray | None = None) -> GrowthNumbers:
         """Sort values by their growth; the members of a pair have equal growth and stay together."""
         blocks = np.full(len(values), -1) if blocks is None else blocks
         order = np.lexsort((-values.imag, np.abs(values.imag), -growth))
@@ -45,7 +45,7 @@ ROUNDING = 1e-12
 """Growth that counts as zero, relative to the largest value: some thousand rounding errors (a choice)."""
 
 
-class Problem(Protocol):
+class BranchProblem(Protocol):
     """Equations R(z) = 0 whose solutions form a curve; z ends with the parameters `names`."""
 
     names: tuple[str, ...]
@@ -68,7 +68,7 @@ class Problem(Protocol):
     def accept(self, z: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Make a solution the reference of the next ones; return it and its tangent in the unknowns that follow."""
 
-    def critical(self, z: np.ndarray) -> Critical:
+    def critical(self, z: np.ndarray) -> GrowthNumbers:
         """Return what decides the stability of a solution."""
 
     def kind(self, value: complex, turned: bool) -> BifurcationKind:

@@ -31,7 +31,7 @@ T = TypeVar("T")
 
 def encode(value: object, data: xr.Dataset) -> tuple[Tree, Variables]:
     """Return the fields of a frozen value in JSON types, and the arrays that are not in `data`."""
-    writer = _Writer(data, _classes_in(type(value)))
+    writer = _Encoder(data, _classes_in(type(value)))
     root = writer.tree(value, "")
     return {"root": root, "scenes": [json.loads(text) for text in writer.scenes]}, writer.arrays
 
@@ -61,7 +61,7 @@ def _classes_in(kind: type) -> dict[str, type]:
     return classes
 
 
-class _Writer:
+class _Encoder:
     """Convert a value to a JSON tree; collect its scenes and the arrays that are not in the dataset."""
 
     def __init__(self, data: xr.Dataset, classes: Mapping[str, type]) -> None:
