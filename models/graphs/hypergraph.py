@@ -38,6 +38,13 @@ class Hypergraph(Topology):
     References
     ----------
     Gambuzza et al., Nat. Commun. 12, 1255 (2021).
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> graph = sc.graphs.triangles([(1, 2, 3), (2, 3, 4, "1/2")])
+    >>> graph.triangles
+    ((0, 1, 2, Fraction(1, 1)), (1, 2, 3, Fraction(1, 2)))
     """
 
     triangles: tuple[Triangle, ...]
@@ -94,6 +101,10 @@ def triangles(of: Topology | Iterable[Sequence[object]], n: int | None = None, n
     ValueError
         On a triangle whose nodes are not different or not in 1 … n, on a repeated triangle, on a weight that is 0 or
         not rational, and on a graph with one-way links.
+
+    See Also
+    --------
+    synchain.graphs.Hypergraph
 
     Examples
     --------
