@@ -20,8 +20,9 @@ def default_start(
 
     Up to four oscillators start at 0.30, 0.28, 0.26, 0.24.  The first two values are from the source paper (Marszal et
     al., Eur. Phys. J. Special Topics, 2016); the others continue the sequence.  More oscillators are spread evenly over
-    0.30 … 0.24, so that the initial spread does not grow with the network.  A `centre` is a state around which the same
-    distances are taken.  Raises ValueError if `centre` has an unknown component.
+    0.30 … 0.24, so that the initial spread does not grow with the network.  Around a `centre` the same distances are
+    parts of its first component, or of its largest one if the first is 0.  Raises ValueError if `centre` has an unknown
+    component.
     """
     if centre is None:
         if n <= 4:
@@ -31,9 +32,9 @@ def default_start(
         return {name: first if k == 0 else (0.0,) * n for k, name in enumerate(components)}
     check_keys("INITIAL of the oscillator", centre, components)
     middle = {name: check_number(f"INITIAL of the oscillator: {name}", centre.get(name, 0.0)) for name in components}
-    # 0.02 from one oscillator to the next, 0.06 over all at most
-    width = min(2 * (n - 1), 6)
-    first = tuple(width * (n - 1 - 2 * i) / (200 * (n - 1)) for i in range(n)) if n > 1 else (0.0,)
+    # 0.02 from one oscillator to the next, 0.06 over all at most, in a unit that changes with that of the states
+    width, unit = min(2 * (n - 1), 6), abs(middle[components[0]]) or max(map(abs, middle.values())) or 1.0
+    first = tuple(unit * width * (n - 1 - 2 * i) / (200 * (n - 1)) for i in range(n)) if n > 1 else (0.0,)
     return {
         name: tuple(x + distance for distance in (first if k == 0 else (0.0,) * n))
         for k, (name, x) in enumerate(middle.items())

@@ -158,15 +158,24 @@ def test_initial_names_states(name: str) -> None:
         assert scene.y0 == tuple(initial.get(c, 0.0) for c in scene.components), "one oscillator starts at the centre"
 
 
-@pytest.mark.parametrize(("n", "x"), [(1, (2.0,)), (2, (2.01, 1.99)), (4, (2.03, 2.01, 1.99, 1.97)), (7, None)])
+@pytest.mark.parametrize(("n", "x"), [(1, (2.0,)), (2, (2.02, 1.98)), (4, (2.06, 2.02, 1.98, 1.94)), (7, None)])
 def test_starts_lie_around_the_centre(n: int, x: tuple[float, ...] | None) -> None:
     start = default_start(("x", "y"), n, {"x": 2.0, "y": 5.0})
     assert start["y"] == (5.0,) * n
     distances = np.diff(start["x"])
     without = np.diff(default_start(("x", "y"), n)["x"])
-    assert np.allclose(distances, without, rtol=0, atol=1e-15)
+    assert np.allclose(distances, 2.0 * without, rtol=0, atol=1e-15)
     assert math.isclose(sum(start["x"]), 2.0 * n)
     assert x is None or start["x"] == x
+
+
+@pytest.mark.parametrize("centre", [{"x": -0.7, "y": 5.0}, {"y": 5.0}])
+@pytest.mark.parametrize("unit", [2.0**-20, 2.0**20])
+def test_starts_around_a_centre_change_with_the_unit_of_the_states(unit: float, centre: dict[str, float]) -> None:
+    start = default_start(("x", "y"), 3, centre)
+    other = default_start(("x", "y"), 3, {name: unit * value for name, value in centre.items()})
+    assert other == {name: tuple(unit * value for value in values) for name, values in start.items()}
+    assert len(set(start["x"])) == 3
 
 
 def test_an_unknown_state_in_initial_is_refused() -> None:
