@@ -489,7 +489,7 @@ def _() -> Quantities:
 
 @scene("Chua in a one-way ring, rodas4", long=True)
 def _() -> Quantities:
-    given = SHORT | {"integrator": "rodas4"}
+    given = SHORT | {"integrator": "rodas4", "initial": {"x": [0.7 + 0.02, 0.7, 0.7 - 0.02]}}
     graph = synchain.graphs.one_way_ring(3)
     return simulated(Scene(oscillator="chua", coupling="x->x", topology=graph, **given), sigma=[1.0, 3.0])
 
