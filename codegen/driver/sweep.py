@@ -29,6 +29,16 @@ def counts_every_step(dims):
 
 
 @njit(error_model="numpy")
+def note_error(lanes, clock, y, multiplicity, dims):
+    """Store the synchronisation error of some lanes, with which their next step begins."""
+    now = np.empty(WIDTH)
+    store(now, 0, spread(y, multiplicity, dims))
+    for lane in range(WIDTH):
+        if (lanes >> lane) & 1:
+            put(clock, SYNC, lane, now[lane])
+
+
+@njit(error_model="numpy")
 def enter(lane, cell, rows, clock, y, multiplicity, dims):
     """Put a cell into a lane, with the first values of its records."""
     fill(lane, cell, rows, clock, y, dims)
@@ -40,9 +50,7 @@ def enter(lane, cell, rows, clock, y, multiplicity, dims):
     if dims.stops:
         put(clock, MARK, lane, rows.control[MAX_STEPS])
     if dims.components > 0:
-        now = np.empty(WIDTH)
-        store(now, 0, spread(y, multiplicity, dims))
-        put(clock, SYNC, lane, now[lane])
+        note_error(1 << lane, clock, y, multiplicity, dims)
 
 
 @njit(error_model="numpy")
@@ -186,7 +194,10 @@ def drive(functions, dims, multiplicity, rule, network, first, last, inputs, out
         # 6. Move the accepted lanes to the end of the step, and find the lanes that step 3 must look at.
         largest = advance(clock, y, t, t_new, accept, y_new, dims)
         if CONTACTS:
-            changed = change_modes(accept, t_new, y, friction) & lane_bits(counted)
+            changed = change_modes(accept, t_new, y, friction)
+            if dims.components > 0 and dims.felt > 0 and changed != 0:  # an impact or a reset may have moved the state
+                note_error(changed, clock, y, members, dims)
+            changed &= lane_bits(counted)
             if dims.events and changed != 0:
                 note_events(changed, load(clock, BASE, WIDTH) + t_new, cell, counts, points, friction)
         if SERIES:

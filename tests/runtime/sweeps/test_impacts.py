@@ -158,6 +158,15 @@ def test_events_in_files(tmp_path) -> None:
     assert {"open", "slip"} <= set(read.replace(contact="set-valued").components)
 
 
+@pytest.mark.parametrize("integrator", METHODS)
+def test_the_error_of_clocks_that_reset_one_after_the_other(integrator: str) -> None:
+    """x' = 1, reset from 1 to 0, apart by d: the distance is d, and 1 - d for a time d of each period."""
+    clock, apart = sc.Field({X: 1}, events=[sc.Reset(X - 1, {X: 0})]), 1e-6
+    pair = scene(clock, 3.0, integrator, 2, coupling="x->x", initial={"x": [0.25, 0.25 + apart]}, record=("sync_error",))  # fmt: skip
+    found = sc.run(pair, workers=1, show_progress=False, sigma=[0.0])
+    assert float(found.sync_error[0]) == pytest.approx(2 * apart * (1 - apart), rel=1e-7)
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
