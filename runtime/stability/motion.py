@@ -241,14 +241,16 @@ def path(
         after = integrator.state[0, :count]
         lower, higher = np.minimum(low, after), np.maximum(high, after)
         moved, extent = SHARE * np.abs(after - before[0]), higher - lower
+        # a component that has moved by rounding alone limits no step
+        farthest = np.maximum(extent, SHARE * ROUNDING * np.abs(after))
         taken, velocity = integrator.steps - done, rates.values(after)
         turned = step * JUMP > last and _cosine(speed, velocity, extent) < TURNED
-        if step > shortest and (taken > 2 * few + FINE or turned or np.any(moved > extent)):
+        if step > shortest and (taken > 2 * few + FINE or turned or np.any(moved > farthest)):
             integrator.state, step = np.pad(before, ((0, 0), (0, hidden))), max(shortest, 0.5 * step)
             continue
         low, high, speed, last, few = lower, higher, velocity, step, taken
         yield before, step, extent, velocity
-        step *= 1.5 if np.all(2.0 * moved <= extent) else 1.0
+        step *= 1.5 if np.all(2.0 * moved <= farthest) else 1.0
 
 
 def _cosine(first: np.ndarray, second: np.ndarray, extent: np.ndarray) -> float:
@@ -266,11 +268,17 @@ def shortest_time(rates: RateFunctions, state: np.ndarray) -> float:
     size, speed = np.abs(state), np.abs(rates.values(state))
     moving = (size > 0.0) & (speed > 0.0)
     times = [*(size[moving] / speed[moving])]
-    scale = np.where(size > 0.0, size, size.max(initial=0.0) or 1.0)
-    slopes = rates.slopes(state, scale) / scale[None, :]
-    if np.isfinite(slopes).all() and (fastest := np.abs(np.linalg.eigvals(slopes)).max()) > 0.0:
+    if (fastest := _fastest(rates, state)) > 0.0:
         times.append(1.0 / fastest)
     return FIRST * float(min(times, default=1.0 / FIRST))
+
+
+def _fastest(rates: RateFunctions, state: np.ndarray) -> float:
+    """Return the largest eigenvalue of the slopes of the rates, by size; 0 if the slopes are not finite."""
+    size = np.abs(state)
+    scale = np.where(size > 0.0, size, size.max(initial=0.0) or 1.0)
+    slopes = rates.slopes(state, scale) / scale[None, :]
+    return float(np.abs(np.linalg.eigvals(slopes)).max()) if np.isfinite(slopes).all() else 0.0
 
 
 def turns_of(integrator: OrbitIntegrator, rates: RateFunctions, hidden: int = 0, drifts: bool = True) -> Turns:
@@ -342,7 +350,11 @@ def _drift(
         return None
     swing = np.abs(rates.slopes(states[-1], extent)).sum(axis=1)
     limits = np.nan_to_num(closed * swing) + DIGITS * rates.sizes(states[-1])
-    return last if np.all(changes <= limits) else None
+    if np.any(changes > limits):
+        return None
+    # the first steps from a small component are so short that no rate changes: wait for the time of the fastest rate
+    fastest = _fastest(rates, states[-1])
+    return last if fastest == 0.0 or times[-1] * fastest >= 1.0 else None
 
 
 def _mean_turn(times: np.ndarray, states: np.ndarray, fewest: int) -> float:

@@ -65,3 +65,19 @@ def test_locked_phases_that_turn_evenly_are_at_rest(k: float) -> None:
     result = lyapunov_spectrum(scene, periods=50)
     np.testing.assert_allclose(result.exponent / k, expected / k, atol=2e-3)
     assert "turn of the slowest rate" in str(result)
+
+
+@pytest.mark.parametrize("z", [1e-6, 1e-9, -1e-9, 1e-12])
+def test_a_start_just_beside_a_switch_has_the_turns_of_the_motion(z: float) -> None:
+    """Relay feedback of 1/(s + 1)**3: half a period is 1.839875335432399, by matrix exponentials in 40 digits."""
+    relay = Field({"x": "-sign(z) - x", "y": "x - y", "z": "y - z"}, contact="set-valued")
+    start = np.array([[0.7258679257978837, 0.2906309222293034, z, 1.0]])
+    assert OrbitProblem.of_modes(Scene(relay, None), np.zeros(1), start, 1).unit == pytest.approx(
+        2 * 1.839875335432399, rel=2e-3
+    )
+
+
+@pytest.mark.parametrize("y", [1e-9, 1e-12])
+def test_a_small_component_is_no_drift(y: float) -> None:
+    """Rates hardly change in the first steps, which are short compared with the time in which the small component grows."""
+    assert unit(LORENZ, (10.0, y, 20.0)) == pytest.approx(0.755, rel=0.1)
