@@ -15,6 +15,7 @@ import sympy as sp
 from ..inputs.names import LinkName, NodeName
 from ..mechanics import calculus
 from ..mechanics.components import Block, Edge, Node
+from ..mechanics.rows import Law
 from .equations import Ends, Equations, Layer
 from .variational import expect_continuous
 
@@ -166,6 +167,11 @@ def derivative(equations: Equations, name: str) -> Equations:
 
 def _check(equations: Equations) -> None:
     """Raise ValueError for rates that jump, whose derivatives do not describe small deviations."""
+    if laws := {row.law for node in equations.nodes for row in node.rows}:
+        events = " and ".join({Law.SIGN: "set-valued signs"}.get(law, f"{law}s") for law in Law if law in laws)
+        raise ValueError(
+            f"derivative of a network: found {events}; expected smooth rates; use steep rates in their place"
+        )
     if equations.sticks:
         raise ValueError(
             "derivative of a network: found set-valued friction; expected smooth rates; use contact 'atan'"

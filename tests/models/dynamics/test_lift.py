@@ -155,6 +155,9 @@ def test_rates_that_jump_are_refused() -> None:
     for call in (lambda: lifted(belt.equations), lambda: derivative(belt.equations, belt.equations.parameters[0])):
         with pytest.raises(ValueError, match=r"found set-valued friction; expected smooth rates; use contact 'atan'"):
             call()
+    clock = sc.Field({"x": "1 - sign(x)"}, contact="set-valued", events=[sc.Reset("x - 1", {"x": "0"})])
+    with pytest.raises(ValueError, match=r"found set-valued signs and resets; expected smooth rates; use steep"):
+        lifted(sc.Scene(clock, None).equations)
     jumping = sc.Scene(sc.Field({"x": "-sign(x)"})).equations
     with pytest.raises(ValueError, match="by which rates jump"):
         lifted(jumping)
