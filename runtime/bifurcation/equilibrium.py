@@ -79,7 +79,7 @@ error of
 1e-16 moves the eigenvalue by its square root."""
 
 LEAST = 1e-12
-"""Size of an eigenvalue that is a rounding error, relative to the fastest rate (a choice)."""
+"""Size of an eigenvalue that is a rounding error, relative to the fastest rate at the equilibrium (a choice)."""
 
 SMALL = 64
 """Most unknowns of which the matrix is dense (a choice)."""
@@ -290,7 +290,11 @@ def near(
     jacobian, blocks = network.jacobian(state), None if count else ModeBlocks.of(scene.equations)
     by_modes = None if blocks is None else blocks.values(jacobian)
     values = eigenvalues(jacobian, network.mass(state), count) if by_modes is None else by_modes[0]
-    values[np.abs(values) <= LEAST * _fastest(network, first, state)] = 0.0
+    sizes, limit = np.abs(values), LEAST * _fastest(network, state)
+    if np.any((sizes > limit) & (sizes <= LEAST * _fastest(network, first))):
+        # the terms of a slope may be larger than the slope, as those of x - sin x at 0
+        limit = LEAST * _fastest(network.sized(scene.parameters), state)
+    values[sizes <= limit] = 0.0
     values = values[np.lexsort((-values.imag, -values.real))]
     return Equilibrium(scene, state, values, names, speeds, residual, steps)
 
@@ -305,7 +309,8 @@ def resting_equations(function: str, scene: Scene) -> Equations:
         )
     if equations.sticks:
         raise ValueError(
-            f"{function}: found set-valued friction, under which whole ranges of states rest; expected a smoothed law"
+            f"{function}: found set-valued friction, stops or resets, under which whole ranges of states may rest; "
+            "expected smooth rates; use contact 'atan', or a model without events"
         )
     expect_continuous(equations)
     return equations

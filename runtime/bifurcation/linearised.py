@@ -133,6 +133,16 @@ class Linearised:
         rates, masses = (tuple(each.at(values) for each in part) for part in (self.rate_templates, self.mass_templates))
         return replace(self, rate_templates=rates, mass_templates=masses)
 
+    def sized(self, values: Mapping[str, float]) -> Linearised:
+        """Return equations whose Jacobian holds the `term_size` of each entry, to which its rounding is relative."""
+
+        def sizes(template: TermTemplate) -> list[Block]:
+            states = frozenset(template.states)
+            return [tuple(tuple(term_size(e, states) for e in row) for row in block) for block in _slopes(template)]
+
+        rates = (TemplateFunction.of(each, self.dimension, sizes(each)).at(values) for each in self.templates)
+        return replace(self, rate_templates=tuple(rates))
+
     def along(self, order: int) -> Linearised:
         """Return the derivative of r along u of an order, r_x u or r_xx u u, as a function of the vector (x, u).
 

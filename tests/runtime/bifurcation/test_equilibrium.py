@@ -203,7 +203,9 @@ def test_what_is_refused(scene: sc.Scene, options: dict[str, int], message: str)
 
 
 def test_set_valued_friction_rests_in_whole_ranges() -> None:
-    with pytest.raises(ValueError, match="set-valued friction, under which whole ranges of states rest"):
+    with pytest.raises(
+        ValueError, match="set-valued friction, stops or resets, under which whole ranges of states may rest"
+    ):
         sc.equilibrium(sc.Scene("froude", contact="set-valued"))
 
 
@@ -308,3 +310,12 @@ def test_where_newton_fails_the_motion_leads_to_rest() -> None:
     for unit, size in ((1.0, 1.0), (1e6, 1e-6), (1e-6, 1e6)):
         result = sc.equilibrium(sc.Scene(hump, None, initial={"x": 1.5 * size}), k=unit, s=size)
         assert result.state / size == pytest.approx([-2.103803402735536], rel=1e-12)
+
+
+def test_eigenvalues_do_not_depend_on_the_slopes_at_the_start() -> None:
+    """The slope of x - x^3 is -2 at 1, and -3e12 at a start of 1e6; that of x - sin x is zero to rounding at 0."""
+    well = sc.equilibrium(sc.Scene(sc.Field({"x": "x - x**3"}), None, initial={"x": 1e6}))
+    np.testing.assert_allclose(well.eigenvalues, [-2.0], rtol=1e-12)
+    assert well.stable
+    flat = sc.equilibrium(sc.Scene(sc.Field({"x": "x - sin(x)"}), None, initial={"x": 1.0}))
+    assert flat.neutral == 1
