@@ -78,7 +78,7 @@ class Parameter:
         return cls(**{key: _CHECKS.get(key, check_text)(f"{what}: {key}", value) for key, value in arguments.items()})
 
     def check(self, name: str, value: float) -> float:
-        """Return `value` as a float; raise ValueError outside the range, TypeError for no number."""
+        """Return `value` as a float; raise ValueError outside the range, TypeError if it is not a number."""
         if isinstance(value, bool) or not hasattr(value, "__float__"):
             raise TypeError(f"{name} = {value!r} is no number; expected {self.range}")
         number = float(value)

@@ -108,7 +108,7 @@ class Bifurcation(Labelled):
 
     @property
     def orbit(self) -> PeriodicOrbit:
-        """The solution, if it is a periodic orbit; TypeError else."""
+        """The solution, if it is a periodic orbit; raise TypeError for an equilibrium."""
         if not isinstance(self.solution, PeriodicOrbit):
             raise TypeError("orbit: found a bifurcation of equilibria; expected one of periodic orbits; see `solution`")
         return self.solution
@@ -178,7 +178,7 @@ class Drawable(Labelled):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Branch(Drawable):
-    """Equilibria or periodic orbits along a parameter, in the order of the branch; reads like a tuple of them.
+    """Equilibria or periodic orbits along a parameter, in the order of the branch; indexed and iterated like a tuple.
 
     Parameters
     ----------
@@ -294,7 +294,7 @@ class Branch(Drawable):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Diagram(Drawable):
-    """Several branches over one parameter; reads like a tuple of them.
+    """Several branches over one parameter; indexed and iterated like a tuple.
 
     Parameters
     ----------

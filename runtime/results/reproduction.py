@@ -74,7 +74,7 @@ class Reproduction(Labelled):
 
     @property
     def agrees(self) -> np.ndarray:
-        """For each claim, whether the computed number lies within the difference (claims,)."""
+        """True for each claim whose number differs by no more than its allowed difference (claims,)."""
         published, found, difference = np.array([*self.claims.values()]).T
         # rounding of decimal fractions is no disagreement
         near: np.ndarray = np.abs(found - published) <= difference + 1e-12 * np.abs(published)

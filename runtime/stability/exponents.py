@@ -65,8 +65,8 @@ class Exponents(Labelled):
         Exponents per unit of non-dimensional time.
     stderr : ndarray, shape (m,)
         Standard errors. On fixed points and periodic orbits, an error is the difference between two cycles, or between
-        two tolerances. On other motion the mean lies within two errors of the truth in 95 of 100 runs; the error is
-        infinite below 59 periods, and contains the error of the steps (docs/accuracy.md).
+        two tolerances. On chaotic and quasiperiodic motion the true value lies within two errors in 95 of
+        100 runs. The error is infinite below 59 periods. It contains the error of the steps (docs/accuracy.md).
     time : float
         Length of the average of each start.
     starts : int
