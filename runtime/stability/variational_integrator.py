@@ -314,7 +314,12 @@ class VariationalIntegrator:
         if status is not Status.FINISHED:
             largest = np.hypot.reduce(self.strengths).max()
             modes = f" of strengths up to {largest:g}" if largest else ""
-            raise FloatingPointError(f"the orbit with its deviations{modes} cannot be integrated: {status.message}")
+            # rates of deviations have slopes of slopes: |w|^(3/2) has none at 0, where runs pass
+            remedy = "; deviations need finite second derivatives: write abs(w)**(3/2) as (w**2 + 1e-12)**(3/4)"
+            raise FloatingPointError(
+                f"the orbit with its deviations{modes} cannot be integrated: {status.message}"
+                f"{remedy if status is Status.STEP_UNDERFLOW else ''}"
+            )
         # begin the next stretch of a power series with the mean step of this one; warn if the mean step was short
         taken = int(counts[:, 1:3].sum())
         series = self.kernel.origin.method.series

@@ -131,8 +131,8 @@ class CompiledRun:
     Parameters
     ----------
     **values : float or array
-        Values of names in `vary`; the scene has the others.  Arrays are broadcast against each other, and their shape
-        comes first in all results; their cells fill the lanes of the kernel.
+        Values of names in `vary`; names without a value keep that of the scene.  Arrays are broadcast against each
+        other, and their shape comes first in all results.  Their cells fill the lanes of the kernel.
 
     Returns
     -------
@@ -142,7 +142,7 @@ class CompiledRun:
     Attributes
     ----------
     scene : Scene
-        The scene of a call without values, with the name of its integrator.
+        The scene that a call without values runs; it names the integrator.
     vary : tuple of str
         The names that a call may give.
     gradient : tuple of str
@@ -209,7 +209,7 @@ class CompiledRun:
         Parameters
         ----------
         end : CompiledResult
-            A result of this function.  Its arrays are one axis, or zipped axes "cell".
+            A result of this function.  One array becomes an axis; several become axes that advance together, "cell".
 
         Returns
         -------
@@ -254,7 +254,13 @@ class CompiledRun:
                 raise ValueError(self._refusal(name))
             if not isinstance(value, float | int) or isinstance(value, bool):
                 value = _array(name, value)
-                shape = np.broadcast_shapes(shape, value.shape)
+                try:
+                    shape = np.broadcast_shapes(shape, value.shape)
+                except ValueError:
+                    raise ValueError(
+                        f"compiled run: found {name} of the shape {value.shape} beside {shape}; expected shapes that "
+                        "broadcast; give equal lengths"
+                    ) from None
             columns[name] = value
         cells = math.prod(shape)
         if not cells:
@@ -406,6 +412,8 @@ RESERVED = ("t", "y", "status", "d", "run", "values", "shape", "rows", "buffers"
 
 def _names(what: str, names: Iterable[str]) -> tuple[str, ...]:
     """Return names without repetition; a single text is one name."""
+    if isinstance(names, bool) or not isinstance(names, Iterable):
+        raise TypeError(f"compile: {what}: found {names!r}; expected names, e.g. {what}=['k']")
     row = (names,) if isinstance(names, str) else tuple(names)
     if len({*row}) < len(row):
         raise ValueError(f"compile: {what}: found {short_repr(row)}; expected each name once; remove the repetition")
