@@ -54,6 +54,11 @@ CLEAR = 1 / 32
 ENOUGH = 12
 """Number of turns in the mean (a choice)."""
 
+APPROACH, OTHER, AGAIN = 300, 4.0, 20
+"""While a component moves one way, the motion may still approach its attractor.  It runs for APPROACH turns, as many as
+the usual transient, and its turns are measured again, until they last less than OTHER times longer or shorter (choices).
+AGAIN: most measurements."""
+
 REST = 1e-9
 """Rates count as zero if they are below their change over this part of the extent of the motion."""
 
@@ -284,6 +289,26 @@ def _fastest(rates: RateFunctions, state: np.ndarray) -> float:
 def turns_of(integrator: OrbitIntegrator, rates: RateFunctions, hidden: int = 0, drifts: bool = True) -> Turns:
     """Measure the mean return time of an undriven orbit, or the slowest rate of the equilibrium that the orbit reaches.
 
+    The turns of a fast approach, such as those of Lorenz's system from x = 1e4, are not the unit of time.
+    """
+    turns, one_way = _turns_of_path(integrator, rates, hidden, drifts)
+    for _ in range(AGAIN):
+        if not one_way:
+            break
+        try:
+            integrator.advance(APPROACH * turns.time)
+        except FloatingPointError:  # the transient raises the error for an unbounded motion
+            break
+        later, one_way = _turns_of_path(integrator, rates, hidden, drifts)
+        if turns.time / OTHER < later.time < OTHER * turns.time:
+            break
+        turns = later
+    return turns
+
+
+def _turns_of_path(integrator: OrbitIntegrator, rates: RateFunctions, hidden: int, drifts: bool) -> tuple[Turns, bool]:
+    """Return the unit of time and the extent of a path, and True if it turns while some component moves one way.
+
     A motion with constant rates, such as that of locked phases, counts as an equilibrium that drifts. A turn of a
     component lasts from one maximum to the next; between them the component falls and rises by at least CLEAR times its
     extent. The component with the most turns gives the time. Only the later three quarters of a path are searched.
@@ -321,12 +346,13 @@ def turns_of(integrator: OrbitIntegrator, rates: RateFunctions, hidden: int = 0,
         path_states = path_states - np.outer(times, even)
     late = path_states[early:]
     extent = extent_of(path_states, late[len(late) // 2 :])
-    unit, label = time or 2.0 * np.pi, "time in which nothing returns" if time else "nothing moves"
+    unit, label, one_way = time or 2.0 * np.pi, "time in which nothing returns" if time else "nothing moves", False
     if turn := _mean_turn(np.array(times[early:]), late, 1):
         unit, label = turn, "mean return time"
+        one_way = any(np.all(np.diff(x) < 0.0) or np.all(np.diff(x) > 0.0) for x in late.T)
     elif even is not None and (slow := _slowest(rates, states[-1], extent)):
         unit, label = 2.0 * np.pi / slow, "turn of the slowest rate"
-    return Turns(unit, above(extent, rates.rounding(states[-1], unit)), label)
+    return Turns(unit, above(extent, rates.rounding(states[-1], unit)), label), one_way
 
 
 def _drift(

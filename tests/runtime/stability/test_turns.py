@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synchain import Field, Rates, Scene, equilibrium, lyapunov_spectrum
-from synchain.graphs import from_edges
+from synchain import Field, Rates, Scene, equilibrium, exponents, lyapunov_spectrum
+from synchain.graphs import chain, from_edges
 from synchain.runtime.stability.orbits import OrbitProblem
 
 ROSSLER = Field(
@@ -81,3 +81,13 @@ def test_a_start_just_beside_a_switch_has_the_turns_of_the_motion(z: float) -> N
 def test_a_small_component_is_no_drift(y: float) -> None:
     """Rates hardly change in the first steps, which are short compared with the time in which the small component grows."""
     assert unit(LORENZ, (10.0, y, 20.0)) == pytest.approx(0.755, rel=0.1)
+
+
+@pytest.mark.parametrize("far", [1e3, 1e4])
+def test_turns_of_a_fast_approach_are_not_the_unit_of_time(far: float) -> None:
+    """From x = 1e4 Lorenz's system turns 1000 times faster than on its attractor, while x decays."""
+    lorenz = Field({"x": "10*(y - x)", "y": "x*(28 - z) - y", "z": "x*y - 8*z/3"})
+    scene = Scene(lorenz, "x->x", chain(2), initial={"x": far, "y": 0, "z": 0}, time_unit="time")
+    result = exponents(scene, [0.0], starts=1, periods=300, show_progress=False)
+    assert float(result.unit.split()[3]) == pytest.approx(0.7, abs=0.15)
+    assert result.exponent.item() == pytest.approx(0.906, abs=0.1)
