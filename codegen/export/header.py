@@ -33,6 +33,7 @@ class Exported:
         numbers = dict(zip(model.parameters, checked.values(), strict=bool(checked)))
 
         # the head, without comment marks
+        events = "No events: the caller finds where modes change or states are reset, and changes them"
         states = list(model.state)
         if len(states) > SHOWN:
             states = [*states[:3], "…", *states[-3:]]
@@ -45,6 +46,7 @@ class Exported:
             f"State ({equations.dimension}): {', '.join(states)}",
             f"Parameters ({len(names)}): {', '.join(names) or 'none'}",
             f"Equations: {equations.digest[:16]}",
+            *([events] if model.sticks else []),
             *(f"Renamed: {old} is called {new}" for old, new in changed.items()),
         ]
         return cls(model, numbers, [" ".join(line.splitlines()) for line in lines])
