@@ -195,7 +195,7 @@ def test_the_criterion_is_that_of_the_published_table():
     """docs/thresholds.md rests on it: 8 starts, 1000 periods and 100 more, a mean error below 1e-3."""
     criterion = PAPER
     assert (criterion.tolerance, criterion.starts, criterion.reach) == (1e-3, 8, 0.4)
-    assert (criterion.transient, criterion.window, criterion.rtol, criterion.seed) == (1000.0, 100.0, 1e-8, 0)
+    assert (criterion.transient, criterion.window, criterion.rtol, criterion.rng) == (1000.0, 100.0, 1e-8, 0)
 
 
 def test_at_least_half_of_the_starts_must_fall_below_the_tolerance():
