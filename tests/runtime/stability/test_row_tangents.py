@@ -130,7 +130,7 @@ def test_links_of_states_that_an_impact_changes_are_refused(coupling: str) -> No
 def test_networks_of_several_nodes_are_refused() -> None:
     with pytest.raises(ValueError, match="tangent dynamics of a network: found contacts of several coordinates"):
         sc.lyapunov_spectrum(ring(IMPACT, "spring", x=0.4, v=-0.5))
-    with pytest.raises(ValueError, match=r"found .*set-valued|found contacts"):
+    with pytest.raises(ValueError, match="derivative of a network: found stops"):
         sc.lyapunov_spectrum(
             ring(IMPACT, "spring", x=0.4, v=-0.5).replace(topology=sc.graphs.ring(9), initial={"x": [0.4] * 9})
         )
