@@ -21,6 +21,7 @@ import xarray as xr
 from synchain.models.inputs.checks import check_number, check_positive, check_seed, check_table
 from synchain.models.inputs.display import HasPlot
 from synchain.models.inputs.frozen import FrozenDict
+from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Axis, Scene, check_scene
 
 from ..cells.plan import Planner
@@ -75,6 +76,9 @@ class Basin(Labelled):
         Synchronisation error at the end; infinite if a start did not finish or nothing is compared.
     status : ndarray of int, shape (cells, starts)
         How the integration ended.
+    overlaps : tuple of (str, str, int)
+        Two attractors whose conditions both hold at the end, and the number of these starts, which count as the first.
+        Starts that end early because they are certain to synchronise are not compared with other conditions.
     exponent, stderr : ndarray, shape (cells,)
         Largest transversal exponent of the scene's synchronous state; NaN if it was not computed.
 
@@ -96,6 +100,7 @@ class Basin(Labelled):
     status: np.ndarray = field(repr=False)
     exponent: np.ndarray = field(repr=False)
     stderr: np.ndarray = field(repr=False)
+    overlaps: tuple[tuple[str, str, int], ...] = ()  # two attractors whose conditions both hold, and in how many starts
 
     @property
     def data(self) -> xr.Dataset:
@@ -259,6 +264,7 @@ class Basin(Labelled):
             *named,
             ("starts", f"{total}; intervals with confidence {self.confidence:g} contain the undecided starts"),
             *self._share_rows(),
+            *(("in two", f"{first}, {second}: {both} starts, of {first}") for first, second, both in self.overlaps),
             *criterion,
             *ends,
         )
@@ -329,7 +335,8 @@ def basin(
     depends on `rng`, but not on the workers. A larger sample begins with the starts of a smaller one, and all cells of a
     sweep have the same starts. Axes of initial states make a grid of starts.
 
-    A start belongs to the first attractor whose condition holds over the window at the end. The verdict counts if it
+    A start belongs to the first attractor whose condition holds over the window at the end; a warning names two whose
+    conditions both hold, with the number of starts. The verdict counts if it
     was the same over a window at half of the transient; for the synchronous state and for rest, if the error or the
     speed has fallen since. Other starts count as *approaching* while their motion changes from window to window:
     its features (mean over nodes and time, fluctuation in time, spread of the nodes; cosine and sine for angles)
@@ -377,6 +384,11 @@ def basin(
     Basin
         A start takes at most a hundred times as many steps as the synchronous motion. A start that needs more counts as
         escaped or not finished.
+
+    Warns
+    -----
+    RuntimeWarning
+        If the conditions of two attractors hold in one start.
 
     Raises
     ------
@@ -436,6 +448,11 @@ def basin(
         timed = answer
     with Ensemble(timed, starts, criteria, known, limits, execution) as ensemble:
         ensemble.run(DOUBLINGS if endless else 0)
+    for first, second, both in ensemble.overlaps:
+        warn(
+            f"basin: found {both} of {ensemble.fate.size} starts that fulfil {_condition(known.table, first)} and "
+            f"{_condition(known.table, second)}; expected one of them; they count as {first!r}, the first of both"
+        )
     shape = len(ensemble.exponent) * max(len(starts.perturbed), 1), starts.count
     each = np.repeat(np.arange(len(ensemble.exponent)), max(len(starts.perturbed), 1))
     return Basin(
@@ -452,7 +469,13 @@ def basin(
         ensemble.status.reshape(shape),
         ensemble.exponent[each],
         ensemble.stderr[each],
+        ensemble.overlaps,
     )
+
+
+def _condition(table: Mapping[str, str], name: str) -> str:
+    """Return the name of an attractor with its condition, if they differ."""
+    return repr(name) if table[name] == name else f"{name!r} ({table[name]})"
 
 
 def _without_grid(scene: Scene, starts: Starts) -> Scene:

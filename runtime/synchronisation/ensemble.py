@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -113,6 +114,8 @@ class Ensemble:
         self.lengths = np.full((2, count), np.nan)  # lengths of these windows
         self.certain = np.zeros(count, dtype=bool)  # starts that are certain to synchronise
         self.labels: tuple[str, ...] = ()
+        # pairs of attractors whose conditions both hold at the end of starts, with the number of these starts
+        self.overlaps: tuple[tuple[str, str, int], ...] = ()
         self.fate = np.zeros(count, dtype=int)
 
     def __enter__(self) -> Ensemble:
@@ -307,6 +310,7 @@ class Ensemble:
         ranges = self.attractors.ranges([each.take(finished) for each in features], self.box)
         # 1. the attractor of each window: the first one whose condition holds; -1 for none
         verdicts, speeds = np.full((2, len(self.cell)), -1), np.full((2, len(self.cell)), np.nan)
+        holding = np.zeros((len(names), len(self.cell)), dtype=bool)  # conditions that hold in the last window
         parameters = dict(zip(self.equations.parameters, self.numbers[self.cell].T, strict=True))
         tolerance = np.array([c.tolerance for c in self.criteria] or [np.nan])
         tolerance = tolerance[self.cell] if self.criteria else np.full(len(self.cell), np.nan)
@@ -319,6 +323,7 @@ class Ensemble:
                 else:
                     holds = speeds[k] < STILL if text == REST else self.attractors.holds(name, each, parameters)
                 verdicts[k, holds & finished] = number
+                holding[number] = holds & finished
         # 2. a verdict counts if both windows agree, or if the error or the speed falls
         named, agreed = verdicts[1] >= 0, ~earlier | (verdicts[0] == verdicts[1])
         texts = np.array([*table.values(), ""], dtype=object)[verdicts[1]]
@@ -347,6 +352,11 @@ class Ensemble:
         self.fate[finished] = code[APPROACHING]
         decided = finished & named & agreed
         self.fate[decided] = verdicts[1, decided]
+        self.overlaps = tuple(
+            (names[a], names[b], int(both))
+            for a, b in itertools.combinations(range(len(names)), 2)
+            if (both := np.sum(decided & (verdicts[1] == a) & holding[b]))
+        )
         self.fate[other] = code.get(OTHER, 0)
         for k in range(len(numbered)):
             self.fate[other & (group == k + 1)] = code[numbered[k]]

@@ -251,6 +251,19 @@ def test_named_attractors_have_the_shares_of_their_quadrants():
     assert found.attractors == CORNERS
 
 
+def test_a_start_in_two_attractors_is_reported():
+    """Every start of the right well is in the upper half plane of its mean, too."""
+    both = {"right": "mean(x_1) > 0 and mean(x_2) > 0", "sum": "mean(x_1 + x_2) > 0.5", "left": "mean(x_1) < 0"}
+    with pytest.warns(
+        RuntimeWarning, match=r"found \d+ of 64 starts that fulfil 'right' \(mean.*\) and 'sum' \(mean.*\)"
+    ):
+        found = basin(WELLS, samples=64, attractors=both, transient=40.0, window=5.0, show_progress=False)
+    shared = round(64 * share(found, "right"))
+    assert found.overlaps == (("right", "sum", shared),)
+    assert shared > 0
+    assert f"right, sum: {shared} starts, of right" in str(found)
+
+
 def test_motions_without_a_name_are_grouped_and_keep_their_number_along_a_sweep():
     found = basin(
         WELLS, samples=64, attractors={}, sigma=[0.0, 0.02, 0.04], transient=40.0, window=5.0, show_progress=False
