@@ -219,6 +219,8 @@ class Equations(_Cached, HasLatex):
         problem = next((text for text, holds in problems.items() if holds), None)
         if problem is not None:
             expected = "links of one layer" if problem.endswith("layers of links") else "links that have no inertia"
+            if problem.startswith("nodes that differ"):
+                expected += "; `mismatch` computes how far nearly equal nodes stay apart"
             raise ValueError(f"{what}: found {problem}; expected equal nodes with {expected}")
 
     def expect_pairs(self, what: str) -> None:

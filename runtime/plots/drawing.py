@@ -292,7 +292,10 @@ def _(value: TransitionCheck, axes: Axes, **style: Any) -> Axes:
             look = line_style(style, marker="o", label=f"step {k + 1}")
             axes.errorbar(value.strength[k] / step.strength, value.exponent[k], 2 * value.stderr[k], **look)
     axes.set(xlabel="strength / predicted strength", ylabel="exponent of the cluster state per unit of time")
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4)
+    else:
+        note(axes, "no step has exponents on both sides")
     return axes
 
 

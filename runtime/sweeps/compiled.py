@@ -431,7 +431,10 @@ def _check_name(what: str, scene: Scene, name: str) -> None:
 
 def _array(name: str, value: object) -> np.ndarray:
     try:
-        return np.asarray(value, dtype=float)
+        array = np.asarray(value)
+        if array.dtype == bool:
+            raise TypeError
+        return array.astype(float)
     except (TypeError, ValueError):
         raise TypeError(f"{name} = {short_repr(value)}; expected a number or an array of numbers") from None
 

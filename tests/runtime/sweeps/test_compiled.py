@@ -278,6 +278,12 @@ def test_what_has_no_answer_is_refused(call: Any, message: str) -> None:
         call()
 
 
+@pytest.mark.parametrize("value", [True, [True, False], np.True_])
+def test_truth_values_are_no_numbers(value: Any) -> None:
+    with pytest.raises(TypeError, match=r"k = .*True.*; expected a number or an array of numbers"):
+        sc.compile(scene(), ["k"])(k=value)
+
+
 def test_values_are_checked_as_in_a_scene() -> None:
     pendulum = sc.Lagrangian("m*v**2/2", "k*x**2/2", coordinates={"x": "v"}, parameters={"m": 1.0, "k": 1.0})
     go = sc.compile(Scene(pendulum, transient=0, window=1), ["m", "k"])

@@ -195,6 +195,16 @@ def test_a_plot_has_a_line_for_each_node_and_step():
     plt.close()
 
 
+def test_a_plot_without_exponents_has_a_remark_and_no_legend(recwarn):
+    _, axes = plt.subplots()
+    unknown = np.full((4, 2), np.nan)
+    TransitionCheck(sequence(ELEVEN), np.ones((4, 2)), unknown, unknown, ("",) * 4).plot(axes)
+    assert axes.get_legend() is None
+    assert [text.get_text() for text in axes.texts] == ["no step has exponents on both sides"]
+    assert not recwarn
+    plt.close()
+
+
 def test_the_command_prints_what_python_prints(tmp_path, capsys):
     scene = Scene(WINDOW, "x->x", ring(4), parameters={"sigma": 1.0})
     scene.save(tmp_path / "ring.toml")
