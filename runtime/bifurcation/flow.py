@@ -22,6 +22,7 @@ from synchain.codegen.integrators import Integrator
 from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import LARGEST_UNROLLED_LIFT
 from synchain.codegen.machine_code.compile import load
+from synchain.models.dynamics.angles import periods_of_states
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.lift import Lift, lifted
 from synchain.models.dynamics.variational import Variation, network_variation
@@ -125,7 +126,9 @@ class LiftedFlow:
             terms, mass = network.term_sizes(x), network.mass(x)
             return terms if mass is None else np.abs(spsolve(mass, terms))
 
-        return Walker(self, values, state), RateFunctions(lambda x: self.rates(values, x[None])[0], sizes)
+        return Walker(self, values, state), RateFunctions(
+            lambda x: self.rates(values, x[None])[0], sizes, periods_of_states(self.equations)
+        )
 
     def advance(self, values: Mapping[str, float], states: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Integrate the states without deviations."""

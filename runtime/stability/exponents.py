@@ -461,7 +461,10 @@ def along(
         begun = reached[aperiodic]
         march = March.begin(problem, begun, interpolation_for(problem, begun, averaging.periods))
         by_start[aperiodic], error[aperiodic], time = average(march, averaging, reporter)
-        warn_of_slow_motion(problem.variation.orbit, begun, problem.parameter_values, time)
+        ends = [] if problem.forced or problem.variation.events else [*begun, *march.integrator.state]
+        rates = [problem.rates.contraction(state, problem.extent) for state in ends]
+        contraction, whole = float(np.mean(rates or math.nan)), averaging.transient * problem.unit + time
+        warn_of_slow_motion(problem.variation.orbit, begun, problem.parameter_values, time, contraction, whole)
 
     groups = group_by_attractor(attractors, by_start, error)
     first = list(groups[0])

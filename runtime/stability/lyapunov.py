@@ -263,8 +263,12 @@ def lyapunov_spectrum(
             batches.extend(growths[:, None], parts)
         steps = frame.error_of_steps()
     orbit = frame.integrator
-    warn_of_slow_motion(equations, orbit.state[:, : equations.dimension], _values(scene), batches.time)
-    return _report(frame, batches, lost, steps)
+    result = _report(frame, batches, lost, steps)
+    contraction, whole = -result.divergence / frame.size, averaging.transient * frame.unit + batches.time
+    warn_of_slow_motion(
+        equations, orbit.state[:, : equations.dimension], _values(scene), batches.time, contraction, whole
+    )
+    return result
 
 
 def _values(scene: Scene) -> np.ndarray:

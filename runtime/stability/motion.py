@@ -18,7 +18,9 @@ import numpy as np
 import sympy as sp
 
 from synchain.codegen.driver.columns import Control
+from synchain.models.dynamics.angles import periods_of_states
 from synchain.models.dynamics.equations import Equations
+from synchain.models.inputs.keywords import warn
 from synchain.models.mechanics.components import TIME, Edge, Node
 
 from .averages import ROUNDING
@@ -48,16 +50,19 @@ NOISE = 10.0
 EVEN = 1e-3
 """Largest relative change of the speed of an even drift (a choice)."""
 
+FURTHER = 1e9
+"""A drift goes on for ever: rates must not change when its components move FURTHER times as far (a choice)."""
+
 CLEAR = 1 / 32
 """Least rise and fall of a turn, relative to the extent of its component (a choice)."""
 
 ENOUGH = 12
 """Number of turns in the mean (a choice)."""
 
-APPROACH, OTHER, AGAIN = 300, 4.0, 20
-"""While a component moves one way, the motion may still approach its attractor.  It runs for APPROACH turns, as many as
-the usual transient, and its turns are measured again, until they last less than OTHER times longer or shorter (choices).
-AGAIN: most measurements."""
+APPROACH, OTHER, AFFORDED = 300, 4.0, 4_000_000
+"""While a component moves one way that changes the rates, the motion still approaches its attractor.  It runs for APPROACH
+turns, as many as the usual transient, then for twice as long each time. A later turn counts if it lasts OTHER times longer
+or shorter. After AFFORDED steps a warning says that the motion may be an approach (choices)."""
 
 REST = 1e-9
 """Rates count as zero if they are below their change over this part of the extent of the motion."""
@@ -99,10 +104,31 @@ class RateFunctions(NamedTuple):
 
     values: Callable[[np.ndarray], np.ndarray]
     sizes: Callable[[np.ndarray], np.ndarray]
+    periods: tuple[float | None, ...] = ()  # the period of each state that is an angle, None for the others
 
     def rounding(self, state: np.ndarray, time: float) -> np.ndarray:
         """Return the distance (p,) by which rounding alone may move each component within a time."""
         return np.asarray(ROUNDING * (np.abs(state) + np.nan_to_num(time * self.sizes(state))))
+
+    def ignore(self, state: np.ndarray, move: np.ndarray, allowed: np.ndarray | float = 0.0) -> bool:
+        """Return True if the rates do not depend on a drift (p,): if a move changes none by more than `allowed`.
+
+        Angles move by whole turns, other components FURTHER times as far, each alone or all by their mean.
+        """
+        periods = np.array(self.periods or (None,) * len(state), dtype=float)  # NaN for None
+        angle, moving = np.isfinite(periods), move != 0.0
+        turns = np.where(angle, periods, 1.0)
+        moves = [np.where(angle, turns * np.round(move / turns), FURTHER * move)]
+        if np.any(moving & ~angle):
+            moves.append(np.where(moving & ~angle, FURTHER * move[moving & ~angle].mean(), moves[0]))
+        if np.any(moving & angle):
+            moves.append(np.where(moving, move[moving].mean(), 0.0))
+        here = self.values(state)
+        with np.errstate(all="ignore"):
+            return any(
+                bool(np.all(np.abs(self.values(there) - here) <= allowed + DIGITS * self.sizes(there)))
+                for there in (state + each for each in moves)
+            )
 
     def slopes(self, state: np.ndarray, extent: np.ndarray) -> np.ndarray:
         """Return the change (p, p) of each rate, to first order, if one component moves by its extent."""
@@ -110,6 +136,11 @@ class RateFunctions(NamedTuple):
         with np.errstate(all="ignore"):
             moved = [self.values(state + move) - here for move in np.diag(ASIDE * extent)]
         return np.array(moved).T / ASIDE
+
+    def contraction(self, state: np.ndarray, extent: np.ndarray) -> float:
+        """Return the rate at which volumes shrink in each dimension at a state; NaN if it cannot be computed."""
+        scale = np.where(extent > 0.0, extent, np.where(state != 0.0, np.abs(state), 1.0))
+        return -float(np.trace(self.slopes(state, scale) / scale)) / len(state)
 
 
 class Turns(NamedTuple):
@@ -129,9 +160,9 @@ def rates_of(equations: Equations, parameters: dict[str, float]) -> RateFunction
     names = [sp.Symbol(name, real=True) for name in (*equations.state, *equations.parameters)]
     values = np.array([parameters[name] for name in equations.parameters], dtype=float)
     rates, sizes = (_summed(equations, names, values, change) for change in (lambda e: e, _size))
-    mass = equations.mass()
+    mass, angles = equations.mass(), periods_of_states(equations)
     if not mass:
-        return RateFunctions(rates, sizes)
+        return RateFunctions(rates, sizes, angles)
     masses, places = sp.lambdify(names, [*mass.values()], "numpy"), tuple(np.array([*mass]).T)
 
     def inverse(state: np.ndarray) -> np.ndarray:
@@ -140,7 +171,7 @@ def rates_of(equations: Equations, parameters: dict[str, float]) -> RateFunction
         return np.linalg.inv(matrix)
 
     return RateFunctions(
-        lambda state: inverse(state) @ rates(state), lambda state: np.abs(inverse(state)) @ sizes(state)
+        lambda state: inverse(state) @ rates(state), lambda state: np.abs(inverse(state)) @ sizes(state), angles
     )
 
 
@@ -289,25 +320,44 @@ def _fastest(rates: RateFunctions, state: np.ndarray) -> float:
 def turns_of(integrator: OrbitIntegrator, rates: RateFunctions, hidden: int = 0, drifts: bool = True) -> Turns:
     """Measure the mean return time of an undriven orbit, or the slowest rate of the equilibrium that the orbit reaches.
 
-    The turns of a fast approach, such as those of Lorenz's system from x = 1e4, are not the unit of time.
+    The turns of a fast approach, such as those of Lorenz's system from x = 1e6, are not the unit of time.
     """
-    turns, one_way = _turns_of_path(integrator, rates, hidden, drifts)
-    for _ in range(AGAIN):
-        if not one_way:
+    turns, path_states = _turns_of_path(integrator, rates, hidden, drifts)
+    trend, before, length, begun = _trend(path_states), path_states[-1], 0.0, integrator.steps
+    while trend.any():
+        length = max(2.0 * length, APPROACH * turns.time)
+        if integrator.steps - begun > AFFORDED:
+            warn(
+                f"found a component that moves one way over {length / turns.time:.1g} turns of {turns.time:.3g} units of time; expected "
+                "motion on an attractor, the unit of time may be that of an approach; start nearer to the attractor"
+            )
             break
         try:
-            integrator.advance(APPROACH * turns.time)
+            integrator.advance(length)
         except FloatingPointError:  # the transient raises the error for an unbounded motion
             break
-        later, one_way = _turns_of_path(integrator, rates, hidden, drifts)
-        if turns.time / OTHER < later.time < OTHER * turns.time:
+        later, path_states = _turns_of_path(integrator, rates, hidden, drifts)
+        if not turns.time / OTHER < later.time < OTHER * turns.time:
+            turns = later
+        # the same components go on the same way, and the rates depend on them
+        move = path_states[-1] - before
+        trend = np.where((_trend(path_states) == trend) & (np.sign(path_states[0] - before) == trend), trend, 0.0)
+        if rates.ignore(before, np.where(trend, move, 0.0)):
             break
-        turns = later
+        before = path_states[-1]
     return turns
 
 
-def _turns_of_path(integrator: OrbitIntegrator, rates: RateFunctions, hidden: int, drifts: bool) -> tuple[Turns, bool]:
-    """Return the unit of time and the extent of a path, and True if it turns while some component moves one way.
+def _trend(states: np.ndarray) -> np.ndarray:
+    """Return 1 or -1 for each component that moves one way through the states (k, p), else 0; 0 for one state."""
+    steps = np.sign(np.diff(states, axis=0))
+    return np.where(np.all(steps == steps[:1], axis=0), steps[0], 0.0) if len(steps) else np.zeros(states.shape[1])
+
+
+def _turns_of_path(
+    integrator: OrbitIntegrator, rates: RateFunctions, hidden: int, drifts: bool
+) -> tuple[Turns, np.ndarray]:
+    """Return the unit of time and the extent of a path, and its later states (k, p) if it turns, else its last one.
 
     A motion with constant rates, such as that of locked phases, counts as an equilibrium that drifts. A turn of a
     component lasts from one maximum to the next; between them the component falls and rises by at least CLEAR times its
@@ -346,13 +396,12 @@ def _turns_of_path(integrator: OrbitIntegrator, rates: RateFunctions, hidden: in
         path_states = path_states - np.outer(times, even)
     late = path_states[early:]
     extent = extent_of(path_states, late[len(late) // 2 :])
-    unit, label, one_way = time or 2.0 * np.pi, "time in which nothing returns" if time else "nothing moves", False
+    unit, label, turning = time or 2.0 * np.pi, "time in which nothing returns" if time else "nothing moves", late[-1:]
     if turn := _mean_turn(np.array(times[early:]), late, 1):
-        unit, label = turn, "mean return time"
-        one_way = any(np.all(np.diff(x) < 0.0) or np.all(np.diff(x) > 0.0) for x in late.T)
+        unit, label, turning = turn, "mean return time", late
     elif even is not None and (slow := _slowest(rates, states[-1], extent)):
         unit, label = 2.0 * np.pi / slow, "turn of the slowest rate"
-    return Turns(unit, above(extent, rates.rounding(states[-1], unit)), label), one_way
+    return Turns(unit, above(extent, rates.rounding(states[-1], unit)), label), turning
 
 
 def _drift(
@@ -376,7 +425,8 @@ def _drift(
         return None
     swing = np.abs(rates.slopes(states[-1], extent)).sum(axis=1)
     limits = np.nan_to_num(closed * swing) + DIGITS * rates.sizes(states[-1])
-    if np.any(changes > limits):
+    ahead = np.where(far, last * (times[-1] - times[first]), 0.0)
+    if np.any(changes > limits) or not rates.ignore(states[-1], ahead, limits):
         return None
     # the first steps from a small component are so short that no rate changes: wait for the time of the fastest rate
     fastest = _fastest(rates, states[-1])

@@ -22,7 +22,7 @@ NEURON = Field(
 
 
 def unit(node: Field, start: tuple[float, ...], **parameters: float) -> float:
-    initial = dict(zip("xyz", start, strict=True))
+    initial = dict(zip("xyz" if len(start) == 3 else "xv", start, strict=True))
     scene = Scene(node, None, initial=initial, parameters=parameters)
     return OrbitProblem.of_modes(scene, np.zeros(1), np.array([start]), 1).unit
 
@@ -83,7 +83,7 @@ def test_a_small_component_is_no_drift(y: float) -> None:
     assert unit(LORENZ, (10.0, y, 20.0)) == pytest.approx(0.755, rel=0.1)
 
 
-@pytest.mark.parametrize("far", [1e3, 1e4])
+@pytest.mark.parametrize("far", [1e3, 1e4, 1e6])
 def test_turns_of_a_fast_approach_are_not_the_unit_of_time(far: float) -> None:
     """From x = 1e4 Lorenz's system turns 1000 times faster than on its attractor, while x decays."""
     lorenz = Field({"x": "10*(y - x)", "y": "x*(28 - z) - y", "z": "x*y - 8*z/3"})
@@ -91,3 +91,24 @@ def test_turns_of_a_fast_approach_are_not_the_unit_of_time(far: float) -> None:
     result = exponents(scene, [0.0], starts=1, periods=300, show_progress=False)
     assert float(result.unit.split()[3]) == pytest.approx(0.7, abs=0.15)
     assert result.exponent.item() == pytest.approx(0.906, abs=0.1)
+
+
+def test_a_slow_manifold_is_no_even_drift() -> None:
+    """From x = 100 van der Pol's oscillator creeps for 5000 units, while v follows x; its period is 6.66328685932313."""
+    oscillator = Field({"x": "v", "v": "(1 - x**2)*v - x"})
+    assert unit(oscillator, (100.0, 0.0)) == pytest.approx(6.66328685932313, rel=2e-3)
+
+
+def test_a_free_spring_that_drifts_has_the_turns_of_its_spring() -> None:
+    """Both ends of the spring move one way for ever, and no rate depends on where they are."""
+    pair = Field({"x": "u", "u": "y - x", "y": "w", "w": "x - y"})
+    scene = Scene(pair, None, initial={"x": 0.0, "u": 1.2, "y": 0.5, "w": 1.0})
+    found = lyapunov_spectrum(scene, periods=20, transient=10)
+    assert float(found.unit.split()[3]) == pytest.approx(2**0.5 * np.pi, rel=1e-2)
+
+
+def test_an_amplitude_that_decays_slowly_is_reported() -> None:
+    """From x = 1000 a hard spring turns a thousand times faster than where its damping takes it."""
+    spring = Field({"x": "v", "v": "-x**3 - x - 0.01*v"}, initial={"x": 1e3, "v": 0.0})
+    with pytest.warns(RuntimeWarning, match="shrink by a factor 1.02"):
+        exponents(Scene(spring, "x->x", chain(2)), [0.0], starts=1, periods=300, show_progress=False)
