@@ -43,8 +43,8 @@ def test_a_function_without_strengths_takes_them() -> None:
 
 def test_unequal_nodes_are_sent_to_mismatch() -> None:
     scene = Scene("rossler", "x->x", chain(3), parameters={"a": [0.2, 0.2, 0.21]})
-    with pytest.raises(ValueError, match="nodes that differ in a; .*; `mismatch` computes how far nearly equal nodes"):
-        msf(scene, [0.1], **SHORT)
+    with pytest.raises(ValueError, match=r"nodes that differ in a; .*; `mismatch` computes how far nearly equal nodes"):
+        msf(scene, [0.0, 0.1], **SHORT)
 
 
 def test_the_command_takes_the_same(capsys: pytest.CaptureFixture[str]) -> None:
