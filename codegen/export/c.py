@@ -11,6 +11,8 @@ from ..program.expressions import Name, Number, call
 from ..program.printers import C99
 from ..program.statements import Array, Do, Statement, called, mentioned
 from .body import is_unrolled, link_jacobian, link_tables, node_jacobian, weights, wrapped
+from .c_functions import in_c
+from .events import EventText, algorithm, has_events, tables
 from .header import Exported
 from .loops import jacobian_statements, mass_statements, rhs_statements
 
@@ -64,7 +66,8 @@ def to_c(equations: Equations, values: Mapping[str, float] | None = None) -> str
     """Return a C99 source with `rhs` and `jacobian`.
 
     Networks of up to eight nodes are written out; larger networks become loops.  `values` (name -> number) become the
-    defaults of PARAMETERS.  Raises ValueError for functions that C99 lacks and for unknown or missing values.
+    defaults of PARAMETERS.  With events, texts that are written out also have `begin` and `run`, which move a state through
+    all events.  Raises ValueError for functions that C99 lacks and for unknown or missing values.
 
     See Also
     --------
@@ -93,7 +96,9 @@ def to_c(equations: Equations, values: Mapping[str, float] | None = None) -> str
         rhs += [*masses, Do(call("solve", "mass_", "rates", Number(1)))]
         jacobian += [*masses, Do(call("solve", "mass_", "matrix", Name("DIMENSION")))]
 
-    usage = (USE + (DENSE if small else SPARSE)).splitlines()
+    events = EventText(model) if has_events(model) else None
+    pushes, strike = (events.pushes(), events.strike()) if events else ([], [])
+    usage = (USE + (DENSE if small else SPARSE)).splitlines() + (["", *events.use()] if events else [])
     lines = ["/*", *(f" * {line}".rstrip() for line in (*map(_safe, exported.head), *usage)), " */", ""]
     lines += ["#include <math.h>", *(["#include <string.h>"] if small else []), ""]
     lines += _sizes(model, small)
@@ -101,10 +106,21 @@ def to_c(equations: Equations, values: Mapping[str, float] | None = None) -> str
         lines += ["/* values of the scene, in the order of `numbers` */"]
         lines += ["const double defaults[PARAMETERS] = {", *wrapped(map(repr, numbers.values())), "};", ""]
     lines += [*SOLVE.splitlines(), ""] if model.inertial else []
-    lines += SIGN if "sign" in called([*rhs, *jacobian]) else []
+    lines += SIGN if "sign" in called([*rhs, *jacobian, *pushes, *strike]) else []
     lines += [*_function(f"void rhs({ARGUMENTS}rates)", rhs), ""]
     lines += _function(f"void jacobian({ARGUMENTS}{'matrix' if small else 'values'})", jacobian)
     lines += [] if small else ["", *_places(model)]
+    if events:
+        sizes = ", ".join(f"{name} = {value}" for name, value in events.sizes().items())
+        lines += ["", "/* events */", f"enum {{ {sizes} }};"]
+        for name, table in tables().items():
+            lines += [f"static const double {name}[] = {{", *table, "};"]
+        lines += ["", *_function(f"static void pushes({ARGUMENTS}rows_)", pushes)]
+        lines += [
+            "",
+            *_function(f"static void strike({ARGUMENTS.replace('const double *state', 'double *state')}rows_)", strike),
+        ]
+        lines += ["", *in_c(algorithm(), ["DIMENSION", *events.sizes()])]
     return "\n".join(lines) + "\n"
 
 

@@ -9,6 +9,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.checks import check_number, short_repr, suggestion
 
 from .body import check_inertia
+from .events import without_events
 from .portable_names import portable
 
 SHOWN = 12
@@ -33,7 +34,6 @@ class Exported:
         numbers = dict(zip(model.parameters, checked.values(), strict=bool(checked)))
 
         # the head, without comment marks
-        events = "No events: the caller finds where modes change or states are reset, and changes them"
         states = list(model.state)
         if len(states) > SHOWN:
             states = [*states[:3], "…", *states[-3:]]
@@ -46,7 +46,7 @@ class Exported:
             f"State ({equations.dimension}): {', '.join(states)}",
             f"Parameters ({len(names)}): {', '.join(names) or 'none'}",
             f"Equations: {equations.digest[:16]}",
-            *([events] if model.sticks else []),
+            *without_events(model, language),
             *(f"Renamed: {old} is called {new}" for old, new in changed.items()),
         ]
         return cls(model, numbers, [" ".join(line.splitlines()) for line in lines])

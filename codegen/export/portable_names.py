@@ -27,7 +27,8 @@ nearbyint nextafter nexttoward pow pow10 remainder remquo rint round scalb scalb
 tgamma trunc drem finite isinf isnan isfinite isnormal signbit fpclassify signgam j0 j1 jn y0 y1 yn float_t double_t"""
 _OWN = """np math types cfunc carray csc_matrix lsoda_sig address rhs jac jacobian jacobian_places sparsity state rates
 numbers matrix mass_ solve right_ values sign i_ j_ k_ link_ weight_ NODES DIMENSION PARAMETERS LINKS ENTRIES TARGET SOURCE
-WEIGHT NUMBER ROWS COLUMNS STATE NODE HEAVY defaults memset"""
+WEIGHT NUMBER ROWS COLUMNS STATE NODE HEAVY defaults memset
+rows_"""
 RESERVED = {*f"{_C} {_MATH} {_OWN}".split(), *keyword.kwlist, *keyword.softkwlist, *dir(builtins)}
 """Names used by the languages, their mathematical libraries or the exported text; a symbol of this name is renamed."""
 

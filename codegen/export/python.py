@@ -9,10 +9,11 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 
 from ..program.expressions import Name, call
-from ..program.printers import NUMPY
+from ..program.printers import MATH, NUMPY
 from ..program.statements import Array, Return, Statement, called, let
 from .array_statements import entry_tables, jacobian_arrays, mass_arrays, rhs_arrays
 from .body import is_unrolled, wrapped
+from .events import EventText, algorithm_in_lists, has_events, tables
 from .header import Exported
 from .loops import jacobian_statements, mass_statements, rhs_statements
 
@@ -32,14 +33,24 @@ def sparsity():
     matrix.data[:] = 1.0
     return matrix'''
 
+SLOPES = '''
+
+def slopes(t, state, numbers, rates):
+    """Write d(state)/dt."""
+    with np.errstate(all="ignore"):  # of a step that is too long
+        rates[:] = rhs(t, state, *numbers).tolist()
+
+'''
+
 
 def to_python(equations: Equations, values: Mapping[str, float] | None = None) -> str:
     """Return a module with rhs(t, state, …), jac(t, state, …) and sparsity() for scipy.integrate.solve_ivp.
 
     The parameters follow the state, in the order of Equations.parameters; `values` (name -> number) become their
     defaults.  Networks of up to eight nodes are written out, and jac returns a dense matrix.  Larger networks become
-    array operations, and jac returns a sparse matrix.  Raises ValueError for functions that NumPy lacks and for unknown
-    or missing values.
+    array operations, and jac returns a sparse matrix.  With events, modules that are written out also have `begin` and
+    `run`, which move a state through all events.  Raises ValueError for functions that NumPy lacks and for unknown or
+    missing values.
 
     See Also
     --------
@@ -88,10 +99,19 @@ def to_python(equations: Equations, values: Mapping[str, float] | None = None) -
     state = repr(list(model.state))
     if not small:
         state = f'[f"{{name}}_{{i + 1}}" for name in {[s.name for s in model.node.state]!r} for i in range(NODES)]'
+    events = EventText(model) if has_events(model) else None
     kind = "DIMENSION x DIMENSION" if small else "a sparse matrix"
     lines = [
         *(f"# {line}".rstrip() for line in exported.head),
-        *("#", f"# Use: {use}", "", "import numpy as np", *sorted(imports), ""),
+        *(
+            "#",
+            f"# Use: {use}",
+            *(f"# {line}" for line in (events.use() if events else [])),
+            "",
+            "import numpy as np",
+            *sorted(imports),
+            "",
+        ),
         f"NODES, DIMENSION = {model.n}, {model.dimension}",
         f"STATE = {state}",
         *(_dense_places(model) if small else entry_tables(model)),
@@ -99,8 +119,24 @@ def to_python(equations: Equations, values: Mapping[str, float] | None = None) -
         *_function("rhs", arguments, "Return d(state)/dt, DIMENSION numbers.", rhs),
         *_function("jac", arguments, f"Return d(rates)/d(state), {kind}.", jac),
         SPARSITY if small or not model.inertial else COUPLED,
+        *(_events(events, numbers) if events else []),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _events(events: EventText, numbers: Mapping[str, float]) -> list[str]:
+    """Return the lines of a run through events."""
+    lines = ["", "", "# events", "import math", ""]
+    lines += [f"{name} = {value}" for name, value in events.sizes().items()]
+    lines += (
+        ["NUMBERS = [", *wrapped(map(repr, numbers.values())), "]"] if numbers or not events.model.parameters else []
+    )
+    lines += [line for name, table in tables().items() for line in (f"{name} = [", *table, "]")]
+    about = {"pushes": "Write the numbers of all rows.", "strike": "Change a state at an event."}
+    for name, body in (("pushes", events.pushes()), ("strike", events.strike())):
+        lines += ["", "", f"def {name}(t, state, numbers, rows_):", f'    """{about[name]}"""']
+        lines += [f"    {line}" for line in MATH.lines(body)]
+    return [*lines, *SLOPES.splitlines(), "", algorithm_in_lists()]
 
 
 def _defaults(model: Equations, numbers: Mapping[str, float]) -> dict[str, str]:

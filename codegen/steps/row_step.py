@@ -23,7 +23,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.saltation import Events
 from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import Edge, Node
-from synchain.models.mechanics.rows import Law, Row, forces
+from synchain.models.mechanics.rows import Law, Row, forces, struck
 
 from ..program.expressions import Compare, Expression, Load, Name, Number, call, plus
 from ..program.lowering import lower
@@ -104,21 +104,6 @@ def _full(rows: Sequence[Row], row: Row) -> list[sp.Expr]:
     return [sp.S.Zero if each.law is Law.RESET else next(entries) for each in rows]
 
 
-def _struck(
-    node_rows: Sequence[Row], state: Sequence[sp.Symbol], numbers: Sequence[Sequence[sp.Symbol]]
-) -> list[sp.Expr]:
-    """Return the continuous states after an event, from the impulse, correction and firing of each row."""
-    after = []
-    for c, s in enumerate(state):
-        moves = (row.push[c] * z + row.lift[c] * g for row, (z, g, _) in zip(node_rows, numbers, strict=True))
-        e = s + sp.Add(*moves)
-        for row, (_, _, fires) in zip(node_rows, numbers, strict=True):
-            value = dict(row.sets).get(s)
-            e = e if value is None else sp.Piecewise((value, fires > sp.Rational(1, 2)), (e, True))
-        after.append(e)
-    return after
-
-
 class _Writer:
     """The places of the numbers of rows in `out`."""
 
@@ -180,7 +165,7 @@ class _WrittenOut(_Writer):
                     let(s.name, Load("out", self.behind(2 + self.most + k, first + a))) for k, s in enumerate(triple)
                 ]
             size = len(equations.node_at(i).continuous)
-            after = _struck(rows, symbols[:size], numbers)
+            after = struck(rows, symbols[:size], numbers)
             columns += [e for e, s in zip(after, symbols, strict=False) if e != s]
             places += [Number(k) for k, e, s in zip(equations.places[i], after, symbols, strict=False) if e != s]
             held = [a for a, row in enumerate(rows) if row.law is not Law.RESET]
@@ -336,7 +321,7 @@ class _Looped(_Writer):
             if not node.rows:
                 continue
             numbers = [tuple(islice(self.supply, 3)) for _ in node.rows]
-            after = _struck(node.rows, node.continuous, numbers)
+            after = struck(node.rows, node.continuous, numbers)
             changed = [c for c, e in enumerate(after) if e != node.state[c]]
             body = share([after[c] for c in changed], self.names.fresh("z"))
             used |= body.symbols

@@ -201,6 +201,19 @@ def projection(rows: Sequence[Row], plain: Sequence[sp.Expr]) -> tuple[sp.Expr, 
     )
 
 
+def struck(rows: Sequence[Row], state: Sequence[sp.Symbol], numbers: Sequence[Sequence[sp.Symbol]]) -> list[sp.Expr]:
+    """Return the continuous states after an event, from the impulse, correction and firing of each row."""
+    after = []
+    for c, s in enumerate(state):
+        moves = (row.push[c] * z + row.lift[c] * g for row, (z, g, _) in zip(rows, numbers, strict=True))
+        e = s + sp.Add(*moves)
+        for row, (_, _, fires) in zip(rows, numbers, strict=True):
+            value = dict(row.sets).get(s)
+            e = e if value is None else sp.Piecewise((value, fires > sp.Rational(1, 2)), (e, True))
+        after.append(e)
+    return after
+
+
 def off_surfaces(rates: Sequence[sp.Expr], rows: Sequence[Row]) -> tuple[sp.Expr, ...]:
     """Return the rates of a node off all surfaces, with the sign of each level, for printing."""
     free = {row.mode: sp.S.One for row in rows}

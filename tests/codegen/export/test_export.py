@@ -20,7 +20,6 @@ import pytest
 import sympy as sp
 from samples import CASES, Late, numbered, pendula, real, telescopes
 
-from synchain import Field, Reset
 from synchain.codegen.export.c import to_c
 from synchain.codegen.export.numba import to_numba
 from synchain.codegen.export.portable_names import RESERVED, portable
@@ -409,13 +408,6 @@ def test_exported_functions_keep_the_names_of_mechanics(n: int, inertia: bool, l
     np.testing.assert_allclose(rates, right, rtol=1e-12, atol=1e-12 * abs(right).max())
     if matrix.size:
         np.testing.assert_allclose(matrix, slopes, rtol=1e-12, atol=1e-12 * abs(slopes).max())
-
-
-@pytest.mark.parametrize("to_text", [to_c, to_numba, to_python])
-def test_the_head_says_that_events_are_not_in_the_text(to_text) -> None:
-    neuron = Field({"v": "6/5 - v"}, events=[Reset("v - 1", {"v": 0})])
-    texts = [to_text(Scene(each, topology=chain(1)).equations) for each in (neuron, Field({"v": "6/5 - v"}))]
-    assert ["No events: the caller finds" in text for text in texts] == [True, False]
 
 
 def test_a_name_cannot_leave_its_comment() -> None:
