@@ -4,10 +4,9 @@ Two oscillators that push each other apart
 
 .. math:: \ddot x_i = (1 - x_i^2)\, \dot x_i - x_i - k\, (\dot x_j - \dot x_i)
 
-Two van der Pol oscillators have a cycle in phase and a cycle in antiphase.  A network is called stable by the
-multipliers of all its states: the cycle in phase is that of one oscillator, and unstable across.  Both are
-followed in the strength k and change roles at k = 0 (coupled van der Pol oscillators: Storti & Rand, Int. J.
-Non-Linear Mech. 17, 143 (1982)).
+Two coupled van der Pol oscillators have a cycle in phase and a cycle in antiphase.  The links push the oscillators
+apart.  The cycle in phase is then unstable, and the cycle in antiphase is stable.  Both cycles are continued in the
+strength k.  They exchange their stability at k = 0 (Storti & Rand, Int. J. Non-Linear Mech. 17, 143 (1982)).
 """
 
 # %%
@@ -30,8 +29,8 @@ antiphase = sc.follow(apart, "k", within=(-0.3, 0.5), direction="both")
 # %%
 # Check
 # -----
-# Along itself the cycle in phase does not feel k; across, the coupling adds the divergence 2k: by Liouville's
-# formula the product of the two multipliers across is that along times exp(2 k T).
+# The coupling does not change the cycle in phase.  For differences of the oscillators, it adds the divergence 2k.  By
+# Liouville's formula, the product of the two transversal multipliers is exp(2 k T) times that of a single oscillator.
 along, across = together.multipliers[1].real, np.prod(together.across).real
 difference = abs(across / along * np.exp(-2 * 0.3 * together.period) - 1)
 assert difference < 1e-8
@@ -40,13 +39,14 @@ assert abs(apart.period - 7.196573966960774) < 1e-11
 # %%
 # Figure
 # ------
-# Periods of both branches: full lines are stable.
+# The figure shows the periods of both branches.  Solid lines are stable, dotted lines unstable.
 import matplotlib.pyplot as plt
 
-_, axes = plt.subplots()
-for branch, colour in ((in_phase, "tab:blue"), (antiphase, "tab:orange")):
+_, axes = plt.subplots(figsize=(7, 3.6), layout="constrained")
+for branch, colour, name in ((in_phase, "tab:blue", "in phase"), (antiphase, "tab:orange", "antiphase")):
     periods = np.array([orbit.period for orbit in branch])
-    axes.plot(branch.values, np.where(branch.stable, periods, np.nan), colour)
-    axes.plot(branch.values, np.where(branch.stable, np.nan, periods), colour, linestyle=":")
-axes.set(xlabel="k", ylabel="period")
+    axes.plot(branch.values, np.where(branch.stable, periods, np.nan), colour, label=f"{name}, stable")
+    axes.plot(branch.values, np.where(branch.stable, np.nan, periods), colour, linestyle=":", label=f"{name}, unstable")
+axes.set(xlabel="strength k of the links", ylabel="period")
+axes.legend()
 plt.show()

@@ -3,8 +3,8 @@ Basins of a machine
 ===================
 
 The phase of a machine at a grid of fixed frequency obeys :math:`\ddot\theta = P - \alpha\dot\theta - K\sin\theta`.
-It locks to the grid, or it rotates at about :math:`P/\alpha`: which of them depends on the start.  The share of starts
-that lock is the basin stability of Menck, Heitzig, Marwan & Kurths, Nature Physics 9, 89 (2013).
+The machine locks to the grid, or it rotates at about :math:`P/\alpha`.  The start decides which of the two happens.
+The share of starts that lock is called basin stability (Menck, Heitzig, Marwan & Kurths, Nature Physics 9, 89 (2013)).
 """
 
 # %%

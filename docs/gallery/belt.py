@@ -2,13 +2,13 @@ r"""
 Masses on a moving belt
 =======================
 
-Five masses on a belt stick, are carried along, and slip back. A spring holds each to the wall and joins
-it to its neighbours. The friction coefficient falls with the sliding speed from :math:`\mu_s` to
-:math:`\mu_k`, so that rest is unstable.  Stick and slip are exact events (contact ``"set-valued"``).
+Five masses on a belt stick, move with the belt, and slip back. Springs join each mass to the wall and to its
+neighbours. The friction coefficient falls with the sliding speed from :math:`\mu_s` to :math:`\mu_k`, so rest is
+unstable. Stick and slip are exact (contact ``"set-valued"``).
 
-A single mass under friction that does not depend on the speed has a closed form. It slips on a circle about
-:math:`(\varepsilon\mu_k, 0)` that begins where static friction gives way, at
-:math:`(\varepsilon\mu_s, \vartheta_b)` (Galvanetto & Bishop, J. Sound Vib. 213, 1 (1998)).
+The check uses the closed form for a single mass with constant sliding friction. In the phase plane, slip is a circular
+arc around :math:`(\varepsilon\mu_k, 0)`. It begins at :math:`(\varepsilon\mu_s, \vartheta_b)` (Galvanetto & Bishop,
+J. Sound Vib. 213, 1 (1998)).
 """
 
 # %%
@@ -25,7 +25,8 @@ result = sc.run(scene, sigma=0.3)
 # %%
 # Check
 # -----
-# One mass under a law whose coefficient drops at once from rest to slip.
+# One mass is compared with the closed form.  Its friction coefficient drops from static to kinetic at the start of
+# slip.
 import numpy as np
 
 law = sc.friction_law("mu_k*sign(w)", {"mu_s": 0.3, "mu_k": 0.15}, static="mu_s")
@@ -41,8 +42,7 @@ assert difference < 1e-6
 # %%
 # Figure
 # ------
-# Orange masses stick to the belt, blue ones slip. In the phase portrait they stick on the line
-# :math:`v = \vartheta_b`.
+# Orange masses stick to the belt, blue masses slip. In the phase portrait, stick is the line :math:`v = \vartheta_b`.
 import matplotlib.pyplot as plt
 
 motion = result.animate(seconds=8, fps=12)

@@ -2,21 +2,20 @@ r"""
 A ball on a shaken table
 ========================
 
-A ball falls on a table that moves as :math:`A \sin 2\pi t`, and leaves it with the fraction e of its
-relative speed.  One bounce a period is stable until the amplitude reaches
+A ball falls on a table that moves as :math:`A \sin 2\pi t`.  Each impact multiplies the relative speed by the
+restitution e.  The motion with one bounce per period is stable up to the amplitude
 
 .. math::
    A\,\omega^2/g = \sqrt{\pi^2\Big(\frac{1-e}{1+e}\Big)^2 + \frac{4(1+e^2)^2}{(1+e)^4}},
 
-where a multiplier of the exact map of flights passes −1; then the period doubles again and again
-(Tufillaro, Abbott & Reilly, An Experimental Approach to Nonlinear Dynamics and Chaos, Addison-Wesley
-(1992), chapter 1; Luo & Han, Nonlinear Dyn. 10, 1 (1996)).
+at which a multiplier passes −1.  Above, the period doubles repeatedly (Tufillaro, Abbott & Reilly, An Experimental
+Approach to Nonlinear Dynamics and Chaos, Addison-Wesley (1992), chapter 1; Luo & Han, Nonlinear Dyn. 10, 1 (1996)).
 """
 
 # %%
 # Model and run
 # -------------
-# Time begins near the top of a flight.  The section takes one point a period of the drive, from sixteen
+# Time begins near the top of a flight.  The section records one point per period of the drive, from sixteen
 # starts for each amplitude.
 import numpy as np
 import sympy as sp
@@ -42,8 +41,7 @@ result = sc.run(swept, A=amplitudes, realisations=16, draws=starts, rng=1)
 # %%
 # Check
 # -----
-# The multipliers of the orbit are those of the derivative of the flight map, whose product is e²; at the
-# printed amplitude one of them is −1.
+# The product of the multipliers must be e².  At the published amplitude, one of them must be −1.
 orbit = sc.periodic_orbit(scene, 1)
 phase = np.arccos((1 - 0.8) / (1 + 0.8) / 2 / (2 * np.pi * 0.0125))
 trace = 1 + 0.8**2 - 1.8**2 * 0.0125 * (2 * np.pi) ** 2 * np.sin(phase)
@@ -57,7 +55,7 @@ assert difference < 1e-8
 # %%
 # Figure
 # ------
-# The grey line is the printed amplitude.  Beside the cascade a motion of three periods attracts.
+# The grey line is the published amplitude.  The three separate points show another attractor of three periods.
 import matplotlib.pyplot as plt
 
 _, axes = plt.subplots(figsize=(8, 4), layout="constrained")

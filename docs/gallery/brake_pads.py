@@ -2,17 +2,16 @@ r"""
 Brake pads that squeal or slide
 ===============================
 
-A pad on springs is dragged along by a disc of speed :math:`v_d`,
+A disc with the speed :math:`v_d` drags a pad on springs along,
 
 .. math::
    \ddot x = -x - 2\xi\dot x + \mu(v_d - \dot x), \qquad
    \mu(w) = \Big(\mu_k + (\mu_s - \mu_k) e^{-a|w|}\Big)\operatorname{sgn} w .
 
-It slides steadily, or it sticks and slips: both are stable in a range of speeds.  How many of 5000
-random starts end in steady sliding was counted with the program bSTAB (Stender & Hoffmann,
-Nonlinear Dyn. 107, 1451 (2022)).  Pads in a ring that are weakly joined can squeal one by one
-(Papangelo, Hoffmann, Grolet, Stender & Ciavarella, J. Sound Vib. 417, 56 (2018)).  The contact is
-set-valued here: a pad sticks exactly.
+The pad slides steadily, or it sticks and slips.  Both motions are stable in a range of speeds.  The program bSTAB
+counted how many of 5000 random starts end in steady sliding (Stender & Hoffmann, Nonlinear Dyn. 107, 1451 (2022)).  In
+a ring of weakly coupled pads, single pads can squeal (Papangelo, Hoffmann, Grolet, Stender & Ciavarella, J. Sound Vib.
+417, 56 (2018)).  Stick is exact here (contact ``"set-valued"``).
 """
 
 # %%
@@ -49,8 +48,8 @@ pushed = sc.run(ring, realisations=n + 1, draws={"x": [[2] * k + [0.5] * (n - k)
 # %%
 # Check
 # -----
-# The shares lie within four standard errors of those of bSTAB.  One ring against SciPy, which is
-# stopped at every start and end of sticking.
+# The shares agree with those of bSTAB within four standard errors.  One ring is compared with SciPy, which restarts at
+# every start and end of stick.
 from scipy.integrate import solve_ivp
 
 published = np.array([0.0132, 0.08, 0.1478, 0.213, 0.2776, 0.3544, 0.4202, 0.4922, 0.5678, 1])
@@ -91,7 +90,7 @@ assert difference < 1e-8
 # %%
 # Figure
 # ------
-# Left: one pad.  Right: rings of which none to all pads were pushed, and which of them squeal.
+# Left: one pad.  Right: rings in which zero to all pads were pushed at the start, and the pads that squeal at the end.
 import matplotlib.pyplot as plt
 
 _, (left_axes, right_axes) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")

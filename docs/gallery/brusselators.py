@@ -4,9 +4,10 @@ Patterns on a ring of Brusselators
 
 .. math:: \dot x = 2 - (B + 1)x + x^2 y + \tfrac{1}{10} L x, \qquad \dot y = B x - x^2 y + L y
 
-At the uniform state x = 2, y = B/2 of six cells (Prigogine & Lefever, J. Chem. Phys. 48, 1695 (1968)) each mode of the
-ring, with the eigenvalue λ of its Laplacian -L, has a block of two by two.  The branch points, where a determinant
-vanishes, are found with multiplicity and mode, and the patterns that are born there are followed, stable or not.
+Six cells of the Brusselator form a ring (Prigogine & Lefever, J. Chem. Phys. 48, 1695 (1968)).  At the uniform state
+x = 2, y = B/2, each mode of the ring has a Jacobian of size 2 × 2.  It depends on the eigenvalue λ of the mode.  A
+branch point occurs where its determinant vanishes.  The program finds the branch points with their modes, and continues
+the patterns that begin there, stable or not.
 """
 
 # %%
@@ -31,7 +32,7 @@ for point in uniform.bifurcations:
 # %%
 # Check
 # -----
-# The determinant of the block of mode λ vanishes at the branch points, its trace at the Hopf point.
+# The determinant of the 2 × 2 Jacobian of a mode vanishes at the branch points.  Its trace vanishes at the Hopf point.
 
 
 def determinant(B, eigenvalue):
@@ -47,7 +48,7 @@ assert difference < 1e-11
 # %%
 # Figure
 # ------
-# Full lines are stable.  Of all patterns only the checkerboard, born first, is stable at once.
+# Solid lines are stable.  Only one pattern is stable where it begins: the alternating pattern, which begins first.
 import matplotlib.pyplot as plt
 
 axes = sc.diagram(uniform, *patterns).plot(y="x_1")

@@ -2,16 +2,16 @@ r"""
 A cart and its pendulum come to rest
 ====================================
 
-Dry friction acts at the wheels of a cart, with the load N, and in the joint of the pendulum that hangs from
-it, with the load J.  A spring holds the cart,
+A pendulum hangs from a cart, and a spring holds the cart.  Dry friction acts at the wheels, with the load N, and in the
+joint of the pendulum, with the load J.  The energies are
 
 .. math:: T = \tfrac12 v^2 + \tfrac14(v^2 + 2 v\omega\cos\vartheta + \omega^2), \qquad
    V = \tfrac12 x^2 - \tfrac12\cos\vartheta .
 
-Both contacts stick and slip, and each changes the load that the other must hold.  The motion ends at rest after a
-finite time, anywhere in the rectangle :math:`|x| \le N`, :math:`|\sin\vartheta| \le 2J` in which friction
-holds both (Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer, 2004),
-chapter 5).  Friction that is smoothed by a steep function would creep on to the point of least energy.
+Both contacts stick and slip, and each contact changes the force at the other.  The motion ends after a finite time, at
+any point of the rectangle :math:`|x| \le N`, :math:`|\sin\vartheta| \le 2J`.  In this rectangle, friction can hold cart
+and pendulum (Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer, 2004), chapter
+5). With smoothed friction, the cart would creep to the point of least energy.
 """
 
 # %%
@@ -41,8 +41,8 @@ many = sc.run(one.replace(record=(), window=100, rtol=1e-8), realisations=2000, 
 # %%
 # Check
 # -----
-# All end at rest in the rectangle.  One motion agrees with SciPy, which is stopped at each event; of the contacts at
-# zero velocity those stick that agree with the forces.
+# All motions end at rest in the rectangle.  One motion is compared with SciPy, which restarts at each event.  At each
+# event, the check tries all sets of sticking contacts and selects the set that agrees with the forces.
 from itertools import product
 
 from scipy.integrate import solve_ivp
@@ -109,7 +109,7 @@ assert difference < 1e-6
 # %%
 # Figure
 # ------
-# Left: one motion; vertical lines where a contact begins to stick or to slip.  Right: where 2000 motions end.
+# Left: one motion.  Vertical lines mark where a contact begins to stick or to slip.  Right: end points of 2000 motions.
 import matplotlib.pyplot as plt
 
 _, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")

@@ -2,15 +2,15 @@ r"""
 Chimera of two populations
 ==========================
 
-Two populations of equal phases: one moves as one, the other does not, though all are alike (Abrams,
-Mirollo, Strogatz & Wiley, Phys. Rev. Lett. 101, 084103 (2008)),
+In a chimera state, one population of oscillators synchronises and an equal population does not (Abrams, Mirollo,
+Strogatz & Wiley, Phys. Rev. Lett. 101, 084103 (2008)).  The phases obey
 
 .. math::
    \dot\theta_i = \sum_j K_{ij} \sin(\theta_j - \theta_i - \pi/2 + \beta), \qquad
    K_{ij} = \begin{cases} \mu/n & \text{in one population}\\ \nu/n & \text{otherwise} \end{cases}
 
-with :math:`\mu + \nu = 1`, :math:`\mu - \nu = A`.  Phases that start on a Poisson kernel stay on
-one (Ott & Antonsen, Chaos 18, 037113 (2008)), so that two complex order parameters tell everything.
+with :math:`\mu + \nu = 1`, :math:`\mu - \nu = A`.  If the phases are distributed by a Poisson kernel at the start, they
+always are (Ott & Antonsen, Chaos 18, 037113 (2008)).  Two complex order parameters then describe the motion.
 """
 
 # %%
@@ -37,7 +37,7 @@ result = sc.run(scene)
 # %%
 # Check
 # -----
-# The order parameters by SciPy, from the equations of Ott and Antonsen.
+# SciPy integrates the order parameters by the equations of Ott and Antonsen.
 from scipy.integrate import solve_ivp
 
 
@@ -61,10 +61,11 @@ assert r[1].max() < 0.9
 import matplotlib.pyplot as plt
 
 _, (left, right) = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
-left.plot(times, r[0], times, r[1])
-left.plot(times[::10], theory[1, ::10], "k.", label="theory")
-left.set(xlabel="time", ylabel="order parameters", ylim=(0, 1.05))
+left.plot(times, r[0], label="population 1")
+left.plot(times, r[1], label="population 2")
+left.plot(times[::10], theory[1, ::10], "k.", label="population 2, theory")
+left.set(xlabel="time", ylabel="order parameter", ylim=(0, 1.05))
 left.legend()
 right.plot(np.angle(np.exp(1j * (result.states("end") - result.end.values.flat[0]))), ".")
-right.set(xlabel="phase number", ylabel="phase − phase of number 1")
+right.set(xlabel="number of the oscillator", ylabel="phase relative to the first")
 plt.show()

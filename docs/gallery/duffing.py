@@ -2,9 +2,9 @@ r"""
 Duffing's resonance curve
 =========================
 
-The amplitude of :math:`\ddot x = -x - \beta x^3 - \delta\dot x + u\cos\omega t` over the frequency
-has two stable branches: a sweep upwards and a sweep downwards disagree (Duffing (1918); Kovacic &
-Brennan, *The Duffing Equation* (Wiley, 2011), chapter 5).
+The resonance curve of :math:`\ddot x = -x - \beta x^3 - \delta\dot x + u\cos\omega t` has two stable branches in a
+range of frequencies.  Sweeps with rising and falling frequency therefore give different amplitudes (Duffing (1918);
+Kovacic & Brennan, *The Duffing Equation* (Wiley, 2011), chapter 5).
 """
 
 # %%
@@ -30,7 +30,7 @@ downwards = sc.run(scene.replace(continuation="down"))
 # %%
 # Check
 # -----
-# SciPy gives the same amplitude from the first sample of a cell.
+# SciPy starts from the first sample of a cell and gives the same amplitude.
 from scipy.integrate import solve_ivp
 
 up, down = (abs(result.trajectory.sel(component="x", node=1)).max("sample").values for result in (upwards, downwards))

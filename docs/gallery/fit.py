@@ -2,16 +2,16 @@ r"""
 Fit a model to data
 ===================
 
-Pelts of hares and lynxes that the Hudson's Bay Company bought from 1900 to 1920, in thousands, and
-the equations of Lotka and Volterra,
+The data are the numbers of hare and lynx pelts, in thousands, that the Hudson's Bay Company bought from 1900 to 1920.
+The model is that of Lotka and Volterra,
 
 .. math::
    \dot u = (\alpha - \beta v)\,u, \quad \dot v = (-\gamma + \delta u)\,v.
 
-Four parameters and both initial states are fitted to the logarithms of the numbers.  ``sc.compile``
-turns the scene into a function of plain arrays, and integrates the exact derivatives for the
-Jacobian; ``least_squares`` of SciPy needs a few calls.  B. Carpenter, *Predator-Prey Population
-Dynamics: the Lotka-Volterra model in Stan* (2018), https://mc-stan.org, has data and estimates.
+Four parameters and both initial states are fitted to the logarithms of the data.  ``sc.compile`` compiles the scene to
+a function of NumPy arrays, with exact derivatives for the Jacobian.  ``least_squares`` of SciPy then needs only a few
+calls.  Data and estimates: B. Carpenter, *Predator-Prey Population Dynamics: the Lotka-Volterra model in Stan* (2018),
+https://mc-stan.org.
 """
 
 # %%
@@ -50,8 +50,8 @@ fit = least_squares(residual, [*start.values()], jac=jacobian, x_scale=[*start.v
 # %%
 # Check
 # -----
-# The derivatives against complex steps of a Runge-Kutta method in NumPy, and the parameters against
-# the means of Carpenter's posterior distribution, which he gives to two digits.
+# The derivatives are compared with complex steps of a Runge-Kutta method in NumPy.  The parameters are compared with
+# the means of Carpenter's posterior distribution, which have two digits.
 def states(q, steps=200):
     rates = lambda y: np.array([(q[0] - q[1] * y[1]) * y[0], (-q[2] + q[3] * y[0]) * y[1]])  # noqa: E731
     path, h = [np.array(q[4:])], 1 / steps

@@ -7,7 +7,7 @@ Sixteen masses in a ring, joined by springs with a quadratic part,
 .. math::
    H = \sum_i \frac{p_i^2}{2} + \frac{r_i^2}{2} + \alpha\frac{r_i^3}{3}, \qquad r_i = q_{i+1} - q_i,
 
-start in the mode of longest wave (Fermi, Pasta & Ulam, Los Alamos report LA-1940 (1955); Ford,
+start in the mode with the longest wave (Fermi, Pasta & Ulam, Los Alamos report LA-1940 (1955); Ford,
 Phys. Rep. 213, 271 (1992)).
 """
 
@@ -38,7 +38,7 @@ result = sc.run(scene)
 # %%
 # Check
 # -----
-# The energy of the definition above is kept, and SciPy ends at the same state.
+# The energy H is constant, and SciPy gives the same final state.
 from scipy.integrate import solve_ivp
 
 
@@ -64,14 +64,14 @@ assert difference < 1e-9
 # %%
 # Figure
 # ------
-# The energy of the linear modes moves from the first one into its harmonics and comes back.
+# The energy moves from the first linear mode to its harmonics and returns.
 import matplotlib.pyplot as plt
 
 frequency = 2 * np.sin(np.pi * np.arange(1, 5) / n)
 q, p = (np.fft.fft(part, axis=1)[:, 1:5] for part in (y[:, :n], y[:, n:]))
 modes = (abs(p) ** 2 + frequency**2 * abs(q) ** 2) / n
-_, axes = plt.subplots(figsize=(8, 3.4), layout="constrained")
+figure, axes = plt.subplots(figsize=(8, 3.4), layout="constrained")
 axes.plot(result.time, modes, label=[f"mode {k}" for k in range(1, 5)])
-axes.set(xlabel="time", ylabel="energy")
-axes.legend(ncols=4)
+axes.set(xlabel="time", ylabel="energy of the mode")
+figure.legend(loc="outside upper right", ncols=4)
 plt.show()

@@ -2,15 +2,15 @@ r"""
 The friction chain and its threshold
 ====================================
 
-Four oscillators on a moving belt, joined by springs, driven at :math:`\omega = 1.15`:
+Four oscillators on a moving belt are joined by springs and driven at :math:`\omega = 1.15`:
 
 .. math::
    \ddot x_i = -x_i + u\cos\omega t + \varepsilon f(\vartheta_b - \dot x_i)
    + \sigma\sum_j G_{ij} x_j .
 
-Marszal, Saha, Jankowski & Stefański, Eur. Phys. J. Special Topics (2016), measured that two of them
-synchronise up to :math:`\sigma = 0.233`.  The master stability function predicts this for every
-graph from one orbit.
+Marszal, Saha, Jankowski & Stefański, Eur. Phys. J. Special Topics (2016), found by simulation that two oscillators
+synchronise up to :math:`\sigma = 0.233`.  The master stability function predicts such thresholds for every graph from
+one orbit.
 """
 
 # %%
@@ -29,7 +29,8 @@ result = sc.run(four, sigma=np.linspace(0.0, 0.25, 26))
 # %%
 # Check
 # -----
-# The published end of the window of two, and direct simulation on either side of the end of four.
+# The end of the window of two oscillators is compared with the published value.  The end for four oscillators is
+# compared with simulations on both sides of it.
 end = function.windows[0].high
 synchronous = result.sync_error.values < 1e-6
 difference = abs(end - 0.233)

@@ -2,18 +2,17 @@ r"""
 Bursting neurons: electrical and chemical synapses
 ==================================================
 
-Hindmarsh-Rose neurons,
+Hindmarsh-Rose neurons obey
 
 .. math::
    \dot x = a x^2 - x^3 - y - z, \quad \dot y = (a + \alpha) x^2 - y, \quad
-   \dot z = \mu(b x + c - z),
+   \dot z = \mu(b x + c - z).
 
-receive pulses through chemical synapses,
-:math:`-g(x_i - V_s)\sum_j W_{ij}/(1 + e^{-\lambda(x_j - \Theta_s)})`.  Belykh, de Lange & Hasler,
-Phys. Rev. Lett. 94, 188101 (2005), found that the stability of their synchrony depends on the
-number k of signals that each neuron receives and on nothing else of the graph: the threshold of
-g k is one number.  Six neurons with both kinds of synapses, electrical ones on a ring and chemical
-ones between all pairs, are synchronous in a region of the plane of both strengths.
+Chemical synapses add :math:`-g(x_i - V_s)\sum_j W_{ij}/(1 + e^{-\lambda(x_j - \Theta_s)})` to the rate of :math:`x_i`.
+Belykh, de Lange & Hasler, Phys. Rev. Lett. 94, 188101 (2005), found that synchrony depends only on the number k of
+signals that each neuron receives, and not on other properties of the graph.  The threshold of g k is one number.  The
+second network has six neurons with two kinds of synapses: electrical synapses on a ring and chemical synapses between
+all pairs.  The figure shows the region of both strengths in which they synchronise.
 """
 
 # %%
@@ -47,9 +46,9 @@ region = sc.plane(six, k=np.linspace(0, 1, 21), g=np.linspace(0, 0.3, 16), start
 # %%
 # Check
 # -----
-# The five neurons of two layers against SciPy; and the sign of the exponent, which changes between
-# g k = 1.2 and 1.3 for the modes of all graphs together, and without electrical synapses (k = 0) in
-# the plane too, where each neuron receives five signals.
+# Five neurons with two layers are compared with SciPy.  The exponent must change its sign between g k = 1.2 and 1.3 for
+# the modes of all graphs.  It must do so in the plane too, without electrical synapses (k = 0), where each neuron
+# receives five signals.
 from scipy.integrate import solve_ivp
 
 star, path = (np.array(graph.matrix, dtype=float) for graph in (sc.graphs.star(5), sc.graphs.chain(5)))

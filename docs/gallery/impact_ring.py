@@ -2,11 +2,11 @@ r"""
 Impact oscillators in a ring
 ============================
 
-Three driven oscillators, :math:`\ddot x = -x + \cos\omega t` with :math:`\omega = 2.5`, rebound from a stop at
-:math:`x = 0` with 0.8 of their speed (Shaw & Holmes, J. Appl. Mech. 50, 849 (1983)).  Springs of stiffness
-σ join them in a ring.  A small deviation jumps at each impact by a saltation matrix (Müller, Chaos Solitons
-Fractals 5, 1671 (1995)).  It is the same at all nodes, so that the ring splits into modes of strength α,
-and synchrony has a master stability function.
+Three driven oscillators, :math:`\ddot x = -x + \cos\omega t` with :math:`\omega = 2.5`, hit stops at :math:`x = 0` and
+rebound with 0.8 of their speed (Shaw & Holmes, J. Appl. Mech. 50, 849 (1983)).  Springs of stiffness σ join them in a
+ring.  At each impact, a saltation matrix multiplies small deviations (Müller, Chaos Solitons Fractals 5, 1671 (1995)).
+This matrix is the same at all nodes.  The ring therefore splits into modes of strength α, and there is a master
+stability function.
 """
 
 # %%
@@ -35,7 +35,7 @@ result = sc.run(near, sigma=np.linspace(0.01, 2, 100))
 # %%
 # Check
 # -----
-# The orbit with one impact a period T is
+# The orbit with one impact per period T is
 # :math:`x = K(\cos(\omega t + \psi) - \cos\psi\,(\cos t + \tan\frac T2 \sin t))`, with :math:`K = 1/(1 - \omega^2)`.
 # The multipliers of a mode, whose frequency between impacts is :math:`\Omega = \sqrt{1 + \alpha}`, have the
 # product e² and the sum :math:`-2e\cos\Omega T + (1 + e)\cos\psi\,\sin(\Omega T)/(\Omega v^-)`.
@@ -57,8 +57,8 @@ assert np.all((spread < 1e-9) == inside)
 # %%
 # Figure
 # ------
-# Left: the exponent of a mode.  Right: three oscillators, started 1e-6 apart, after 400 periods; grey: the
-# prediction.
+# Left: the exponent of a mode.  Right: three oscillators after 400 periods, with an initial distance of 1e-6.  Grey:
+# the prediction.
 import matplotlib.pyplot as plt
 
 _, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")

@@ -6,8 +6,8 @@ Izhikevich's neuron (IEEE Trans. Neural Netw. 14, 1569 (2003)),
 
 .. math:: \dot v = 0.04 v^2 + 5v + 140 - u + I, \qquad \dot u = 0.02(0.2 v - u),
 
-fires where v reaches 30: then v becomes −65 and u grows by 8.  Forty of them in a ring, whose currents
-differ, are joined by gap junctions.  The record of events holds the time and the neuron of each spike.
+fires when v reaches 30.  Then v is set to −65, and u increases by 8.  Gap junctions join forty neurons with different
+currents in a ring.  The record of events contains the time and the neuron of each spike.
 """
 
 # %%
@@ -34,7 +34,8 @@ result = sc.run(scene.replace(initial={"v": start}), g=[0, 0.1])
 # %%
 # Check
 # -----
-# Spikes of one neuron by Taylor series in 40 digits; the first spikes of the ring by SciPy, which is stopped at each.
+# The spikes of one neuron are compared with Taylor series in 40 digits.  The first spikes of the ring are compared with
+# SciPy, which restarts at each spike.
 from scipy.integrate import solve_ivp
 
 one = sc.run(sc.Scene(neuron, topology=sc.graphs.chain(1), window=200, **settings))
@@ -69,7 +70,7 @@ assert difference < 1e-7
 # %%
 # Figure
 # ------
-# Above without junctions, below with them.
+# Top: without junctions.  Bottom: with junctions.
 import matplotlib.pyplot as plt
 
 _, panels = plt.subplots(2, 1, figsize=(9, 5), sharex=True, layout="constrained")

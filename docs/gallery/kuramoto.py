@@ -4,11 +4,10 @@ Kuramoto's transition
 
 .. math:: \dot\theta_i = \omega_i + \frac{K}{n}\sum_j \sin(\theta_j - \theta_i)
 
-With natural frequencies of a Lorentzian distribution g of half width γ, the order parameter
-:math:`r = |\sum_j e^{i\theta_j}|/n` of infinitely many phases is :math:`\sqrt{1 - K_c/K}` above
-:math:`K_c = 2/(\pi g(0)) = 2γ` (Kuramoto, Chemical Oscillations, Waves, and Turbulence, Springer
-1984; Strogatz, Physica D 143, 1 (2000)).  On the complete graph the sine is a mean field: a step
-costs n, not n².
+The natural frequencies have a Lorentzian distribution g of half width γ.  For infinitely many phases, the order
+parameter :math:`r = |\sum_j e^{i\theta_j}|/n` is :math:`\sqrt{1 - K_c/K}` above :math:`K_c = 2/(\pi g(0)) = 2γ`
+(Kuramoto, Chemical Oscillations, Waves, and Turbulence, Springer 1984; Strogatz, Physica D 143, 1 (2000)).  The
+coupling is a mean field, so the time of a step is proportional to n, not to n².
 """
 
 # %%
@@ -43,8 +42,8 @@ result = sc.run(scene, K=[0.5, 1, 1.5, 2, 3, 4], realisations=realisations, draw
 # %%
 # Check
 # -----
-# One cell against SciPy, and r against the theory for infinitely many, with the standard errors
-# over the realisations.
+# One cell is compared with SciPy.  The order parameter is compared with the theory for infinitely many phases, in units
+# of the standard errors over the realisations.
 from scipy.integrate import solve_ivp
 
 cell = result.data.isel(K=-1, realisation=0)
@@ -76,8 +75,8 @@ import matplotlib.pyplot as plt
 
 _, axes = plt.subplots(figsize=(7, 3.4), layout="constrained")
 line = np.linspace(0.1, 4, 400)
-axes.plot(line, np.sqrt(np.maximum(0, 1 - 2 * gamma / line)), label="infinitely many")
+axes.plot(line, np.sqrt(np.maximum(0, 1 - 2 * gamma / line)), label="theory, n → ∞")
 axes.errorbar(strengths, r, error, fmt="o", capsize=3, label=f"n = {n}, {realisations} realisations")
-axes.set(xlabel="K", ylabel="r")
+axes.set(xlabel="strength K", ylabel="order parameter r")
 axes.legend()
 plt.show()

@@ -2,11 +2,10 @@ r"""
 All Lyapunov exponents of a ring
 ================================
 
-Sixteen Stuart-Landau oscillators in phase, a discrete complex Ginzburg-Landau equation (Aranson & Kramer,
-Rev. Mod. Phys. 74, 99 (2002)): in the frame that turns with them, mode k of the ring obeys a constant
-2 x 2 matrix.  The real parts of its eigenvalues are the 32 exponents of the network.  The running
-averages show how long an average must be until directions that decay at almost the same rate have
-parted.
+Sixteen Stuart-Landau oscillators in a ring move in phase.  Their equations are a discrete complex Ginzburg-Landau
+equation (Aranson & Kramer, Rev. Mod. Phys. 74, 99 (2002)).  In the rotating frame, each mode of the ring obeys an
+equation with a constant 2 × 2 matrix.  The real parts of the eigenvalues are the 32 exponents of the network.  The
+running averages show how long an average must be to separate exponents that are almost equal.
 """
 
 # %%
@@ -27,7 +26,7 @@ found = sc.lyapunov_spectrum(ring, rtol=1e-10, transient=60, periods=64)
 # %%
 # Check
 # -----
-# Half of the exponents have parted within the transient; the sum of all is the divergence, 16 (2 - 4 - 1.2).
+# Half of the exponents are separated after the transient.  The sum of all is the divergence, 16 (2 - 4 - 1.2).
 import numpy as np
 
 strengths = 0.3 * (2 - 2 * np.cos(2 * np.pi * np.arange(16) / 16))

@@ -2,10 +2,10 @@ r"""
 An ensemble of unequal oscillators
 ==================================
 
-Equal oscillators that synchronise become nearly equal when their parameters differ: to first order,
-the error is proportional to the spread of the parameters (Sorrentino & Porfiri, arXiv:1102.1709).
-Van der Pol oscillators in a ring have :math:`\mu_i = 1 + s\,d_i` with numbers :math:`d_i` of a
-normal distribution.  Twenty networks are drawn; each is run with five sizes s.
+If the parameters of synchronised oscillators differ slightly, the oscillators move nearly alike.  To first order, the
+error is proportional to the spread of the parameters (Sorrentino & Porfiri, arXiv:1102.1709).  Van der Pol oscillators
+in a ring have :math:`\mu_i = 1 + s\,d_i` with normally distributed :math:`d_i`.  Twenty networks are drawn, and each is
+run with five sizes s.
 """
 
 # %%
@@ -37,7 +37,7 @@ result = sc.run(scene, s=sizes, realisations=20, draws={"d": sc.draw.normal(0, 1
 # %%
 # Check
 # -----
-# The last network against SciPy, and the slope of the error over the size.
+# The last network is compared with SciPy.  The slope of the error over the size must be 1.
 from scipy.integrate import solve_ivp
 
 drawn = np.array([result.data[f"d_{k + 1}"].values[-1] for k in range(n)])

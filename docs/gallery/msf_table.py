@@ -3,9 +3,9 @@ A table of master stability functions
 =====================================
 
 A mode of strength :math:`\alpha = -\sigma\gamma` decays where the master stability function
-:math:`\Lambda(\alpha)` is negative (Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998)).  Which
-state of j acts on which state of i decides on its shape; Huang, Chen, Lai & Pecora, Phys. Rev. E
-80, 036204 (2009), compare all nine links for several oscillators.  Here are the nine of Rössler's
+:math:`\Lambda(\alpha)` is negative (Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998)).  The shape of the function
+depends on the link: a state of node j acts on a state of node i.  Huang, Chen, Lai & Pecora, Phys. Rev. E 80, 036204
+(2009), compare all nine links for several oscillators.  This example shows nine links of Rössler's oscillator
 (a = b = 0.2, c = 9) and five of Lorenz's (10, 28, b = 2).
 """
 
@@ -42,8 +42,8 @@ found = {
 # %%
 # Check
 # -----
-# Every published zero lies within four standard errors, and these are small.  If all
-# states act alike, the function is :math:`\Lambda(0) - \alpha`.
+# The zeros agree with all published values within four standard errors.  If every state acts on itself with the same
+# strength, the function must be :math:`\Lambda(0) - \alpha`.
 published = {("Rössler", "xx"): [0.186, 4.614], ("Lorenz", "xx"): [7.3], ("Lorenz", "yy"): [2.3]}
 for name, table in found.items():
     for pair in table:
@@ -61,12 +61,13 @@ assert difference < 1e-5
 # %%
 # Figure
 # ------
+# Dots are published zeros.  Grey curves have no zero.
 import matplotlib.pyplot as plt
 
 _, panels = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
 for axes, (name, table) in zip(panels, found.items()):
     for pair, function in table.items():
-        style = {"label": f"{pair[0]} → {pair[1]}"} if function.intervals else {"color": "lightgrey"}
+        style = {"label": f"{pair[0]} → {pair[1]}"} if function.intervals else {"color": "grey", "alpha": 0.5}
         axes.plot(function.alpha, function.exponent, linewidth=1, **style)
     for pair in table:
         zeros = published.get((name, pair), [])

@@ -1,16 +1,15 @@
 r"""
-Observables and sections of one's own
-=====================================
+Your own observables and sections
+=================================
 
 Kuramoto's phases with inertia (Tanaka, Lichtenberg & Oishi, Phys. Rev. Lett. 78, 2104 (1997)),
 
 .. math::
    \ddot\theta_i = P_i - D\dot\theta_i + \frac{K}{n}\sum_j \sin(\theta_j - \theta_i) ,
 
-are observed through expressions: the order parameter, the mean frequency of each node, the spread
-of the velocities, the largest kinetic energy, and the times at which the fastest phase overtakes
-the slowest.  They are compiled into the kernel, which integrates them with the accuracy of its
-steps and keeps nothing else.
+are the model.  Five observables and sections are defined by expressions: the order parameter, the mean frequency of
+each node, the spread of the velocities, the largest kinetic energy, and the times at which the fastest phase overtakes
+the slowest.  The kernel integrates them with the accuracy of its steps.  It stores no trajectory.
 """
 
 # %%
@@ -44,7 +43,7 @@ result = sc.run(scene, K=np.linspace(0.1, 3, 30))
 # %%
 # Check
 # -----
-# SciPy integrates one run beside the integrals of r and of the spread, and finds the same laps.
+# SciPy integrates one run together with the integrals of r and of the spread.  It finds the same times of overtaking.
 from scipy.integrate import solve_ivp
 
 case = result.data.isel(K=11)
@@ -85,14 +84,14 @@ assert int(case.lap_count) == len(laps)
 # %%
 # Figure
 # ------
-# The phases lock at once: their mean frequencies become one, and the order parameter jumps.
+# All phases lock at the same strength: their mean frequencies become equal, and the order parameter jumps.
 import matplotlib.pyplot as plt
 
 _, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
 left.plot(result.K, result.r, "o-", label="order parameter r")
 left.plot(result.K, result.spread, "s-", label="spread of the velocities")
-left.set(xlabel="K")
-left.legend(loc="center right")
+left.set(xlabel="strength K", ylabel="average over the window")
+left.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2, fontsize="small")
 right.plot(result.K, result.frequency, ".-", linewidth=0.8)
-right.set(xlabel="K", ylabel="mean frequency of each node")
+right.set(xlabel="strength K", ylabel="mean frequency of each node")
 plt.show()

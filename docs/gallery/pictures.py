@@ -2,9 +2,9 @@ r"""
 Pictures of a network
 =====================
 
-What one run and one master stability function show: time series, phase portrait, space-time map, the network, its
-eigenvalues, and its modes on the curve of exponents. The nodes are FitzHugh-Nagumo units (FitzHugh, Biophys. J.
-1, 445 (1961)) in a small world (Watts & Strogatz, Nature 393, 440 (1998)).
+This example shows the plots of one run and one master stability function: time series, phase portrait, space-time map,
+the network, its eigenvalues, and its modes on the curve of exponents. The nodes are FitzHugh-Nagumo oscillators
+(FitzHugh, Biophys. J. 1, 445 (1961)) in a small-world graph (Watts & Strogatz, Nature 393, 440 (1998)).
 """
 
 # %%
@@ -24,7 +24,7 @@ function = sc.msf(scene, np.linspace(0, 0.5, 51), periods=200)
 # %%
 # Check
 # -----
-# The states at the end by SciPy.
+# SciPy gives the same final states.
 from scipy.integrate import solve_ivp
 
 G = np.zeros((24, 24))

@@ -2,10 +2,10 @@ r"""
 The Pleiades
 ============
 
-Seven stars of masses 1 to 7 attract each other in the plane; several pairs come close.  This is the
+Seven stars with masses 1 to 7 attract each other in the plane, and several pairs come close.  This is the
 problem PLEI of Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I* (Springer,
-1993), and of the Test Set for Initial Value Problem Solvers (Mazzia & Magherini, University of
-Bari, release 2.4 (2008)), which prints the positions at t = 3.
+1993).  The Test Set for Initial Value Problem Solvers (Mazzia & Magherini, University of Bari, release 2.4 (2008))
+contains the positions at t = 3.
 """
 
 # %%
@@ -59,10 +59,10 @@ assert difference < 1e-7
 # ------
 import matplotlib.pyplot as plt
 
-_, axes = plt.subplots(figsize=(6, 5), layout="constrained")
+figure, axes = plt.subplots(figsize=(6, 5), layout="constrained")
 for k in range(7):
     path = result.trajectory.sel(node=k + 1)
     axes.plot(path.sel(component="x"), path.sel(component="y"), linewidth=1, label=f"m = {k + 1}")
 axes.set(xlabel="x", ylabel="y", aspect="equal")
-axes.legend(fontsize="small")
+figure.legend(loc="outside right upper")
 plt.show()

@@ -2,15 +2,14 @@ r"""
 A relay in a loop
 =================
 
-A relay switches a chain of three lags at the zeros of its output,
+A relay drives a chain of three lags.  It switches at the zeros of their output,
 
 .. math:: \dot x_1 = u - x_1, \quad \dot x_2 = x_1 - x_2, \quad \dot x_3 = x_2 - x_3, \quad
    u = -\operatorname{sgn} x_3 .
 
-The limit cycle follows from matrix exponentials (Åström, in Adaptive Control, Filtering, and Signal
-Processing (Springer, 1995)).  Its deviations jump at each switch.  Five loops in a ring, joined by
-:math:`x_1`, synchronise.
-"""
+Matrix exponentials give the limit cycle in closed form (Åström, in Adaptive Control, Filtering, and Signal Processing
+(Springer, 1995)).  Small deviations jump at each switch.  Five such loops, joined in a ring by :math:`x_1`,
+synchronise. """
 
 # %%
 # Model and run
@@ -33,8 +32,8 @@ result = sc.run(scene.replace(initial=starts, transient=0, window=30, record=["t
 # %%
 # Check
 # -----
-# Half the period is the first h > 0 at which :math:`x_3` returns to 0 on the cycle with :math:`x(h) = -x(0)`;
-# the multipliers are those of the square of S exp(A h), with the saltation matrix S of a switch.
+# On the cycle, :math:`x(h) = -x(0)` holds after half a period h.  This h is the first zero of :math:`x_3`.  The
+# multipliers are the eigenvalues of the square of S exp(A h), with the saltation matrix S of a switch.
 from scipy.linalg import expm
 from scipy.optimize import brentq
 

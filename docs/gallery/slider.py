@@ -3,9 +3,9 @@ A slider for a parameter
 ========================
 
 Two Duffing oscillators, :math:`\ddot x_i = -\delta \dot x_i + x_i - x_i^3 + u\cos\omega t +
-\sigma(x_j - x_i)`, whose phase portraits follow a slider of Matplotlib: each move of the mouse
-integrates 200 units of time and redraws in a fraction of the time of a frame.  Run the file on a
-desktop to move the slider; the site shows the picture after one move.
+\sigma(x_j - x_i)`, have phase portraits that a slider of Matplotlib changes.  Each move of the slider integrates 200
+units of time and redraws the figure.  To move the slider, run the file on a desktop.  This page shows the figure after
+one move.
 """
 
 # %%
@@ -32,7 +32,7 @@ print(f"{1e3 * (time.perf_counter() - began) / 31:.2f} ms for each position of t
 # %%
 # Check
 # -----
-# A periodic motion against SciPy, and the numbers of ``run``, which are the same to the last bit.
+# A periodic motion is compared with SciPy.  The numbers equal those of ``run`` to the last bit.
 from scipy.integrate import solve_ivp
 
 
@@ -58,8 +58,9 @@ from matplotlib.widgets import Slider
 
 figure, axes = plt.subplots(figsize=(6, 5))
 figure.subplots_adjust(bottom=0.22)
-lines = axes.plot(end.y[:, 0], end.y[:, 1], linewidth=0.7)
+lines = axes.plot(end.y[:, 0], end.y[:, 1], linewidth=0.7, label=["oscillator 1", "oscillator 2"])
 axes.set(xlabel="x", ylabel="v", xlim=(-1.7, 1.7), ylim=(-1.2, 1.2))
+axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
 slider = Slider(figure.add_axes([0.2, 0.05, 0.6, 0.05]), "u", 0.1, 0.5, valinit=0.25)
 
 

@@ -4,8 +4,8 @@ Three stiff classics
 
 Van der Pol's oscillator with :math:`\mu = 1000`, Robertson's reaction and the Oregonator are the
 problems VDPOL, ROBER and OREGO of the Test Set for Initial Value Problem Solvers (Mazzia &
-Magherini, University of Bari, release 2.4 (2008)), which prints their states at the end.  (There,
-VDPOL is written in the time :math:`t/\mu`; here, the time of ROBER is counted in units of 100.)
+Magherini, University of Bari, release 2.4 (2008)).  The Test Set contains their final states.  It uses the time
+:math:`t/\mu` for VDPOL.  Here, the time unit of ROBER is 100.
 """
 
 # %%
@@ -62,8 +62,9 @@ import matplotlib.pyplot as plt
 _, panels = plt.subplots(1, 3, figsize=(10, 3), layout="constrained")
 for axes, (name, result) in zip(panels, results.items()):
     y = result.states("trajectory")
-    axes.plot(result.time[1:], y[1:] / abs(y).max(axis=0))
+    axes.plot(result.time[1:], y[1:] / abs(y).max(axis=0), label=result.component.values.tolist())
     axes.set(title=name, xlabel="time")
-panels[0].set_ylabel("states over their largest values")
+    axes.legend()
+panels[0].set_ylabel("states / largest value")
 panels[1].set_xscale("log")
 plt.show()

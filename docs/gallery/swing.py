@@ -10,7 +10,7 @@ The voltage angles of a power grid without losses obey
 (Filatrella, Nielsen & Pedersen, Eur. Phys. J. B 61, 485 (2008)).  Voltages, reactances and powers
 are those of the IEEE 14-bus test case (Power Systems Test Case Archive, University of Washington;
 as in MATPOWER: Zimmerman, Murillo-Sánchez & Thomas, IEEE Trans. Power Syst. 26, 12 (2011)), in
-units of 100 MVA.  Inertia and damping are not part of the test case: all buses have the same here.
+units of 100 MVA.  The test case contains no inertia and no damping.  Here they are equal for all buses.
 """
 
 # %%
@@ -43,8 +43,8 @@ result = sc.run(scene)
 # %%
 # Check
 # -----
-# SciPy ends at the same state; the angles come to rest where Newton's method finds them, near those
-# that the test case lists for the grid with its losses.
+# SciPy gives the same final state.  The final angles agree with Newton's method.  They differ by less than 1.5° from
+# the listed angles of the test case, whose lines have losses.
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
@@ -79,8 +79,8 @@ import matplotlib.pyplot as plt
 
 _, axes = plt.subplots(figsize=(8, 3.4), layout="constrained")
 angles = result.trajectory.sel(component="theta")
-axes.plot(result.time, np.degrees(angles - angles.sel(node=1))[:, 1:])
+axes.plot(result.time, np.degrees(angles - angles.isel(node=0))[:, 1:])
 axes.plot(np.full(13, 60), listed, "k.", label="listed, with losses")
-axes.set(xlabel="time", ylabel="angle to bus 1 in degrees")
+axes.set(xlabel="time", ylabel="angle to bus 1 in degrees", ylim=(-28, 2))
 axes.legend()
 plt.show()

@@ -2,21 +2,21 @@ r"""
 A brake pad with two patches
 ============================
 
-A pad on springs touches a belt with two patches, at the distances :math:`\pm\tfrac12` from its centre.  It
-moves by x and turns by :math:`\varphi`,
+A pad on springs touches a belt with two patches, at the distances :math:`\pm\tfrac12` from its centre.  It has the
+displacement x, the angle :math:`\varphi` and the energies
 
 .. math:: T = \tfrac12\dot x^2 + \tfrac1{10}\dot\varphi^2, \qquad V = \tfrac12 x^2 + \varphi^2,
 
-so that the patches slide with the velocities :math:`w = \vartheta_b - \dot x \mp \tfrac12\dot\varphi`.  The friction
-coefficient falls with the speed from 1 to 1/2.  Friction on the patch with more load turns the pad, and the
-patches stick and slip in turn.  On equal patches a pad that is not turned moves like a block: both let go, and
-both stick, at the same instants.
+The patches slide with the velocities :math:`w = \vartheta_b - \dot x \mp \tfrac12\dot\varphi`.  The friction
+coefficient falls with the speed from 1 to 1/2.  Friction on the patch with more load turns the pad, and the patches
+stick and slip at different times.  If the loads are equal and the pad is not turned, it moves like a block: both
+patches stick and slip at the same time.
 """
 
 # %%
 # Model and run
 # -------------
-# A contact among the events of a model acts by virtual work: on x and on the rotation.
+# The program computes the forces of the contacts on x and on the rotation by virtual work.
 import sympy as sp
 
 import synchain as sc
@@ -42,7 +42,7 @@ equal = sc.run(scene, delta=0)
 # %%
 # Check
 # -----
-# A pad with equal patches against a block with one contact, which the program treats by other code.
+# A pad with equal patches is compared with a block with one contact.
 block = sc.Lagrangian(
     v**2 / 2, x**2 / 2, {x: sc.friction(belt - v)}, coordinates={x: v}, friction="exponential", parameters={belt: 0.2}
 )
@@ -55,7 +55,7 @@ assert difference < 1e-9
 # %%
 # Figure
 # ------
-# Velocities of the patches; a patch that sticks moves with the belt.  Below: when they stick.
+# Top: velocities of the patches.  A patch that sticks moves with the belt.  Bottom: times of stick.
 import matplotlib.pyplot as plt
 
 velocity, spin, *modes = (

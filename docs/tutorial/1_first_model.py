@@ -2,15 +2,15 @@ r"""
 A first model
 =============
 
-In five minutes: define an oscillator, connect several, run them, plot the result.
+This lesson takes five minutes. It defines an oscillator, connects four of them, runs the network and plots the result.
 """
 
 # %%
 # One oscillator
 # --------------
-# An oscillator is a Lagrangian: kinetic energy T, potential energy V, and the forces Q that have no
-# energy.  This one is van der Pol's with a cubic spring and a drive.  Each constant is a parameter
-# with a default value.
+# An oscillator is defined by its Lagrangian: kinetic energy T, potential energy V, and forces Q without a
+# potential.  This example is van der Pol's oscillator with a cubic spring and a drive.  Each constant is a
+# parameter with a default value.
 import sympy as sp
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -47,24 +47,25 @@ print("parameters:", scene.parameters)
 # %%
 # A run
 # -----
-# ``sigma`` is the stiffness of the springs.  A number sets a parameter.  To change any other setting,
+# ``sigma`` is the stiffness of the springs.  Pass a number to set a parameter.  To change any other setting,
 # use ``replace``.  Here we skip the transient and record twelve drive periods.  The first run
-# compiles a kernel in some seconds; later runs load it from a cache.
+# compiles a kernel in a few seconds; later runs load it from a cache.
 import matplotlib.pyplot as plt
 
 result = sc.run(scene.replace(transient=0, window=12), sigma=0.05)
 print(result.message)
 
-_, axes = plt.subplots(figsize=(7, 3), layout="constrained")
-result.trajectory.sel(component="x").plot.line(x="time", ax=axes)
-axes.set(title="", xlabel="time", ylabel="x")
+figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")
+axes.plot(result.time, result.trajectory.sel(component="x"), label=[f"node {k}" for k in range(1, 5)])
+axes.set(xlabel="time", ylabel="x")
+figure.legend(loc="outside upper right", ncols=4)
 plt.show()
 
 # %%
 # A sweep
 # -------
-# A sequence makes an axis.  All cells run at once, several to a core.  The error is the mean
-# distance of the oscillators from each other, once the transient is over.
+# Pass a sequence to sweep a parameter.  The runs of a sweep are called cells.  They run in parallel, several
+# on each core.  The synchronisation error is the mean distance of the oscillators after the transient.
 import numpy as np
 
 settled = scene.replace(transient=100, window=20)
@@ -72,14 +73,17 @@ sweep = sc.run(settled, sigma=np.linspace(0, 0.03, 31), u=[0.0, 0.5])
 print(sweep.message)
 
 _, axes = plt.subplots(figsize=(7, 3), layout="constrained")
-sweep.sync_error.plot(ax=axes, hue="u", marker=".", yscale="log")
+for amplitude in sweep.u.values:
+    axes.semilogy(sweep.sigma, sweep.sync_error.sel(u=amplitude) + 1e-16, ".-", label=f"u = {amplitude}")
+axes.set(xlabel="stiffness σ", ylabel="synchronisation error")
+axes.legend()
 plt.show()
 
 # %%
-# What ran
-# --------
-# The kernel is Python that can be read.
+# The generated program
+# ---------------------
+# The kernel is a Python program that you can read.
 print("\n".join(sc.kernel(scene.replace(parameters={"sigma": 0.05})).source.splitlines()[:9]))
 
 # %%
-# The next lesson asks where such a network synchronises, and answers before it simulates.
+# The next lesson predicts where a network synchronises, and compares the prediction with a simulation.

@@ -2,21 +2,20 @@ r"""
 The friction chain
 ==================
 
-A mass on a moving belt, held by a spring, is dragged along by dry friction until the spring pulls
-it back: it sticks, slips, and oscillates by itself.  A force :math:`u\cos\omega t` drives it as
-well,
+A spring holds a mass on a moving belt.  Dry friction drags the mass along until the spring pulls it back: it
+sticks, slips, and oscillates by itself.  A force :math:`u\cos\omega t` also drives it,
 
 .. math:: \ddot x = -x + u\cos\omega t + \varepsilon f(\vartheta_b - \dot x).
 
-Four of these in a chain, joined by springs of stiffness :math:`\sigma`: when do they move as one?
-The question is that of Marszal, Saha, Jankowski & Stefański, *Eur. Phys. J. Special Topics* (2016).
+Four of these oscillators form a chain, joined by springs of stiffness :math:`\sigma`.  For which :math:`\sigma` do they
+synchronise?  Marszal, Saha, Jankowski & Stefański asked this in *Eur. Phys. J. Special Topics* (2016).
 """
 
 # %%
 # The scene
 # ---------
-# A scene contains all settings of a run.  Settings that you leave out have default values: the
-# friction oscillator, springs, the published parameters.
+# A scene contains all settings of a run.  The defaults are the friction oscillator, springs, and the published
+# parameters.
 import synchain as sc
 
 scene = sc.Scene(topology=sc.graphs.chain(4), parameters={"omega": 1.15}, record=("sync_error",))
@@ -25,16 +24,16 @@ print(sc.export.text(scene.equations))
 # %%
 # The spectrum
 # ------------
-# A chain of four has four modes.  Each obeys the equation of one oscillator, coupled with the
-# strength :math:`\alpha = -\sigma\gamma`, where γ is its eigenvalue.  They are exact.
+# A chain of four has four modes.  Each mode obeys the equation of one oscillator, coupled with the
+# strength :math:`\alpha = -\sigma\gamma`, where γ is its eigenvalue.  The eigenvalues are exact.
 for eigenvalue in scene.spectrum:
     print(eigenvalue.number, "=", eigenvalue.value)
 
 # %%
 # Stability from one orbit
 # ------------------------
-# The master stability function is the exponent :math:`\Lambda(\alpha)` with which a mode of
-# strength α grows or decays along the synchronous motion.  It does not depend on the graph.
+# The master stability function :math:`\Lambda(\alpha)` is the growth rate of a mode of strength α along the
+# synchronous motion.  A mode decays if it is negative.  The function does not depend on the graph.
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -44,34 +43,35 @@ print("decay for α in", function.intervals, "of", function.attractors[0])
 _, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")
 axes.plot(function.alpha, function.exponent)
 axes.axhline(0.0, color="black", linewidth=0.5)
-axes.set(xlabel="α", ylabel="Λ")
+axes.set(xlabel="strength α of a mode", ylabel="exponent Λ per unit of time")
 plt.show()
 
 # %%
-# With the eigenvalues it becomes a range of σ: all three modes must lie where Λ is negative.  The
-# mode with the largest eigenvalue is the first to be lost.
+# The chain is synchronous if Λ is negative for all three modes with γ < 0.  With the eigenvalues, this gives a range
+# of σ.  The mode with the most negative γ becomes unstable first.
 (window,) = function.windows
 lost = window.high_mode.eigenvalue.number
-print(f"synchronous for {window.low:.4f} < σ < {window.high:.4f}; then γ = {lost} is lost")
+print(f"synchronous for {window.low:.4f} < σ < {window.high:.4f}; above, the mode γ = {lost} is unstable")
 
 # %%
 # The simulation agrees
 # ---------------------
-# A sweep integrates the whole network for every σ and records the mean difference between the
-# oscillators.  The first call compiles a kernel for these equations; later ones find it in a cache.
+# A sweep integrates the whole network for every σ and records the mean difference between the oscillators.  The
+# predicted window is grey.
 
 result = sc.run(scene, sigma=np.linspace(0.0, 0.25, 51))
 print(result.message)
 
 _, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")
-result.sync_error.plot(ax=axes, marker=".")
+axes.plot(result.sigma, result.sync_error, ".-")
 axes.axvspan(window.low, window.high, color="grey", alpha=0.2)
+axes.set(xlabel="stiffness σ", ylabel="synchronisation error")
 plt.show()
 
 # %%
 # Another drive
 # -------------
-# At ω = 1.40 one oscillator is chaotic, and modes need some coupling before they decay.
+# At ω = 1.40 the motion of one oscillator is chaotic.  Modes decay only if the coupling is strong enough.
 chaotic = sc.msf(scene, np.linspace(0.0, 1.0, 101), omega=1.40)
 for low, high in chaotic.intervals:
     print(f"decay for α from {low:.3f} to {high:.3f}")
@@ -81,7 +81,7 @@ for window in chaotic.windows:
 # %%
 # Keep the result
 # ---------------
-# A result is labelled, describes itself, and opens again without the code that made it.
+# A result has labelled axes.  The saved file describes itself, and opens without the code of the model.
 from pathlib import Path
 from tempfile import TemporaryDirectory
 

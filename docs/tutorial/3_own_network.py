@@ -1,32 +1,32 @@
 r"""
-A network of one's own
-======================
+Your own network
+================
 
-Which of your networks can synchronise is decided by two things: the oscillator, whose master
-stability function is negative in some range of strengths, and the graph, whose eigenvalues must all
-fit into it (Pecora & Carroll, *Phys. Rev. Lett.* 80, 2109 (1998)).
+Two things decide whether a network can synchronise.  The master stability function of the oscillator must be
+negative in a range of strengths.  The eigenvalues of the graph must fit into this range (Pecora & Carroll,
+*Phys. Rev. Lett.* 80, 2109 (1998)).
 """
 
 # %%
 # A graph
 # -------
-# A graph is a family with a number of nodes, a list of edges, a matrix, a file, or a graph of
-# networkx.  Weights are exact, and so is the spectrum.
+# Define a graph by a family and a number of nodes, a list of edges, a matrix, a file, or a graph of networkx.
+# Weights and eigenvalues are exact.
 import synchain as sc
 
 friends = sc.graphs.from_edges([(0, 1), (1, 2), (2, 0), (2, 3), (3, 4), (4, 5), (5, 3)])
 print(friends.spectrum)
 
 # %%
-# Two triangles joined by a bridge have the eigenvalues of a graph with that much symmetry; other
-# graphs have algebraic numbers, which are exact too and evaluate to any number of digits.
+# The graph above is two triangles joined by a bridge.  Here are two other graphs.  Their eigenvalues are exact too,
+# and can be evaluated to any number of digits.
 print(sc.graphs.star(6).spectrum)
 print(sc.graphs.cartesian(sc.graphs.ring(5), sc.graphs.chain(3)).spectrum.largest)
 
 # %%
 # The oscillator
 # --------------
-# Rössler's oscillator, coupled in x, has a bounded range.
+# For Rössler's oscillator, coupled in x, modes decay in a bounded range of strengths.
 import numpy as np
 
 scene = sc.Scene(oscillator="rossler", coupling="x->x", topology=friends, record=("sync_error",))
@@ -35,7 +35,7 @@ function = sc.msf(scene, np.linspace(0.0, 6.0, 121), starts=2, periods=400, prec
 print(f"modes decay for α from {low:.2f} to {high:.2f}: a factor of {high / low:.0f}")
 
 # %%
-# A graph can synchronise if the ratio of its largest to its smallest non-zero eigenvalue is less.
+# A graph can synchronise if the ratio of its largest to its smallest non-zero eigenvalue is less than this factor.
 graphs = {
     "two triangles": friends,
     "chain(12)": sc.graphs.chain(12),
@@ -49,10 +49,10 @@ for name, graph in graphs.items():
     print(f"{name:15} ratio {ratio:5.1f}: {words}")
 
 # %%
-# Try it
-# ------
-# The lower end of the window of the two triangles, by simulation of all six oscillators.  Beyond
-# the upper end this oscillator runs away from its attractor, which the exponent cannot know.
+# Compare with a simulation
+# -------------------------
+# The figure shows the lower end of the window of the two triangles, by simulation of all six oscillators.  The
+# predicted window is grey.
 import matplotlib.pyplot as plt
 
 (window,) = function.windows
@@ -69,7 +69,7 @@ plt.show()
 # %%
 # Nodes that differ
 # -----------------
-# No two oscillators of a laboratory are equal.  A parameter may have one value for each node; the
-# error then does not vanish, it becomes small.
+# In a laboratory, no two oscillators are equal.  A parameter may have a different value for each node.  The
+# synchronisation error is then small, but not zero.
 unequal = sweep.replace(parameters={"a": [0.2, 0.201, 0.199, 0.2005, 0.1995, 0.2]})
 print(f"error at σ = 0.7: {float(sc.run(unequal, sigma=0.7).sync_error):.3f}")

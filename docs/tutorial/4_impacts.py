@@ -2,17 +2,17 @@ r"""
 Friction, impacts and resets
 ============================
 
-Some motions change at an instant: a body sticks, a ball hits the floor, a neuron fires.  Such an
-instant is an *event*.  The program finds each event to rounding, changes the motion there, and carries
-small deviations through it, so that stability is exact too.
+Some motions change suddenly: a body sticks, a ball hits the floor, a neuron fires.  Such a change is an *event*.
+The program locates each event to rounding and changes the motion there.  It also computes how small deviations
+change at the event, so that stability is exact too.
 """
 
 # %%
 # A block on a shaken plate
 # -------------------------
 # Dry friction drags a block along with a plate of velocity :math:`\sin t`,
-# :math:`\ddot x = 0.8\,f(\sin t - \dot x)` with :math:`f = \operatorname{sgn}`.  ``contact="set-valued"``
-# lets it stick exactly: there the friction is what holds the block, up to the load 0.8.
+# :math:`\ddot x = 0.8\,f(\sin t - \dot x)` with :math:`f = \operatorname{sgn}`.  With ``contact="set-valued"``
+# the block sticks exactly.  Friction then holds the block, up to the force 0.8.
 import matplotlib.pyplot as plt
 import numpy as np
 import sympy as sp
@@ -33,8 +33,8 @@ print(result.events.event_time.values.round(4))
 print(result.events.event_after.values)
 
 # %%
-# After each event the *mode* of the contact is 0, it sticks, or the sign of the sliding velocity.  The
-# block lets go where the plate's acceleration reaches 0.8, the first time at
+# Each event sets the *mode* of the contact: 0 if the block sticks, else the sign of the sliding velocity.  The
+# block begins to slip when the acceleration of the plate reaches 0.8, for the first time at
 # :math:`\pi - \arcsin 0.6 = 2.4981`.
 velocity, mode = (result.trajectory.sel(component=name) for name in ("v", "slip"))
 
@@ -49,9 +49,9 @@ plt.show()
 # %%
 # A ball that comes to rest
 # -------------------------
-# A *stop* is a gap that stays positive.  Where it closes its rate is reversed and multiplied by the
-# restitution.  A ball bounces infinitely often in a finite time; the program closes the stop once the
-# remaining jumps are smaller than the tolerance.
+# A *stop* is a gap that cannot become negative.  When the gap reaches zero, its rate changes sign and is multiplied
+# by the coefficient of restitution.  A ball bounces infinitely often in a finite time.  The program lets it rest when
+# the remaining bounces are smaller than the tolerance.
 y, g, e = sp.symbols("y g e")
 ball = sc.Lagrangian(
     T=v**2 / 2,
@@ -78,8 +78,8 @@ plt.show()
 # %%
 # A neuron that is reset
 # ----------------------
-# A *reset* sets states where a guard passes zero upwards.  A leaky neuron that integrates a current and
-# fires at 1 locks to the rhythm of the current.
+# A *reset* sets states to new values when a function, the guard, crosses zero upwards.  This leaky neuron integrates
+# a current and fires at the voltage 1.  Its spikes lock to the period of the current.
 V = sp.Symbol("V")
 current = 1.2 + 0.3 * sp.sin(2 * sp.pi * t / 1.7)
 neuron = sc.Field({V: current - V}, events=[sc.Reset(V - 1, {V: 0})])
@@ -92,8 +92,8 @@ print(f"multiplier {orbit.multipliers[0].real:.12f}: a deviation shrinks by this
 # %%
 # Synchrony through impacts
 # -------------------------
-# Driven oscillators that hit a stop, in a ring of springs.  A deviation jumps at each impact; the jump
-# is the same at each node, so that the modes of the ring separate as they do in smooth networks.
+# Four driven oscillators, joined by springs in a ring, hit stops.  A small deviation jumps at each impact.  The jump
+# is the same at each node, so the network splits into modes, as a smooth network does.
 hits = sc.Lagrangian(
     T=v**2 / 2,
     V=x**2 / 2,
@@ -121,15 +121,16 @@ axes.set(xlabel="σ", ylabel="synchronisation error")
 plt.show()
 
 # %%
-# What is refused
-# ---------------
-# Links that act by a state which an event changes at once have no such stability: the order in which
-# equal oscillators are hit would matter.  A simulation takes them.
+# A limit
+# -------
+# A damper acts on velocities, and an impact changes the velocity.  With such links, the result would depend on the
+# order in which equal oscillators are hit.  The master stability function then raises an error.  A simulation supports
+# such links.
 try:
     sc.msf(scene.replace(coupling="damper"), [0, 0.1])
 except ValueError as problem:
     print(problem)
 
 # %%
-# :doc:`Impacts, resets and sliding </impacts>` and :doc:`stick-slip </exact-friction>` have the mathematics,
+# :doc:`Impacts, resets and sliding </impacts>` and :doc:`stick-slip </exact-friction>` explain the mathematics,
 # the scene files and the limits.
