@@ -9,7 +9,7 @@ A relay drives a chain of three lags.  It switches at the zeros of their output,
 
 Matrix exponentials give the limit cycle in closed form (Åström, in Adaptive Control, Filtering, and Signal Processing
 (Springer, 1995)).  Small deviations jump at each switch.  Five such loops, joined in a ring by :math:`x_1`,
-synchronise. """
+synchronise."""
 
 # %%
 # Model and run
