@@ -22,6 +22,7 @@ from synchain.runtime.stability.cluster_exponents import ClusterExponents
 from synchain.runtime.stability.exponents import Exponents
 from synchain.runtime.stability.lyapunov import Lyapunov
 from synchain.runtime.stability.msf import MSF, Plane
+from synchain.runtime.sweeps.work_precision import WorkPrecision
 from synchain.runtime.synchronisation.basin import Basin
 from synchain.runtime.synchronisation.criterion import PAPER
 from synchain.runtime.synchronisation.critical import Critical
@@ -177,6 +178,9 @@ def every_kind() -> dict[str, Labelled]:
         ),
         thresholds(),
         Mismatch(PAIR, ("x", "v"), np.array([-2.0]), np.ones(1), np.ones((1, 2)), np.array([-0.1]), np.ones(1)),
+        WorkPrecision(
+            PAIR, ("taylor",), np.array([1e-6]), np.ones((1, 1)), np.full((1, 1), 1e-7), np.ones((1, 1)), 1e-9
+        ),
         Critical(
             PAIR,
             "sigma",

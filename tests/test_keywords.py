@@ -48,6 +48,7 @@ TAKEN = {
     "plane": ORBITS,
     "transition": ORBITS,
     "mismatch": CELLS,
+    "work_precision": CELLS - {"workers", "executor"} | {"rtol"},
     "critical": ORBITS,
     "cluster_exponents": ORBITS - {"workers"},
     "lyapunov_spectrum": ORBITS - {"workers"},
@@ -60,6 +61,7 @@ TAKEN = {
 
 OTHER = {
     ("periodic_orbit", "periods"): 1,  # of the orbit
+    ("work_precision", "rtol"): (1e-4, 1e-6, 1e-8, 1e-10, 1e-12),  # all of them are measured
     ("skeleton", "periods"): (1, 2),  # of the orbits
 }
 """Defaults that have another value, as the same word has another task."""
@@ -75,7 +77,7 @@ def test_the_shared_keywords_have_the_same_names_and_defaults(name: str) -> None
     for word in TAKEN[name]:
         assert parameters[word].default == OTHER.get((name, word), SHARED[word])
     assert [p.name for p in parameters.values() if p.kind is p.VAR_KEYWORD] == [
-        "axes" if name in ("basin", "run", "stream") else "more"
+        "axes" if name in ("basin", "run", "stream", "work_precision") else "more"
     ]
 
 
@@ -100,6 +102,7 @@ def calls(scene: Scene, path: Any) -> dict[str, Callable[..., object]]:
         "critical": lambda **keywords: synchain.critical(scene, "sigma", (0.1, 0.2), **keywords),
         "transition": lambda **keywords: synchain.transition(scene, [0.0, 0.2], **keywords),
         "mismatch": lambda **keywords: synchain.mismatch(scene, **keywords),
+        "work_precision": lambda **keywords: synchain.work_precision(scene, **keywords),
         "cluster_exponents": lambda **keywords: synchain.cluster_exponents(scene, [0, 0], **keywords),
         "lyapunov_spectrum": lambda **keywords: synchain.lyapunov_spectrum(scene, **keywords),
         "equilibria": lambda **keywords: synchain.equilibria(scene, **keywords),
@@ -153,7 +156,7 @@ def test_what_a_function_cannot_use_is_refused_with_the_reason(name: str, word: 
         calls(DRIVEN, tmp_path / "a.nc")[name](**{word: 1})
 
 
-ONE_CELL = [(name, n) for name in sorted(set(TAKEN) - {"basin", "run", "stream"}) for n in (1, 2)]
+ONE_CELL = [(name, n) for name in sorted(set(TAKEN) - {"basin", "run", "stream", "work_precision"}) for n in (1, 2)]
 
 
 @pytest.mark.parametrize(("name", "n"), ONE_CELL)

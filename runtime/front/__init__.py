@@ -7,6 +7,7 @@
     Scene, load_scene, Axis, Section                 a network with its numbers, starts and records
     run, stream, merge, kernel                       trajectories and records of all cells of a scene
     compile                                          a scene as a fast function of its parameters, with derivatives
+    work_precision                                   time against error of a scene, for each integrator
     msf, plane, exponents, cluster_exponents,
     lyapunov_spectrum                                stability of synchronous, clustered and other motion
     thresholds, critical, transition,
@@ -74,6 +75,7 @@ HOMES = {
     "thresholds": "runtime.synchronisation.threshold",
     "transition": "runtime.synchronisation.transition",
     "universal_probe": "runtime.synchronisation.probe",
+    "work_precision": "runtime.sweeps.work_precision",
 }
 
 __all__ = list(HOMES)

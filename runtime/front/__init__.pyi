@@ -43,6 +43,7 @@ from synchain.runtime.sweeps.compiled import compile as compile
 from synchain.runtime.sweeps.merge import merge as merge
 from synchain.runtime.sweeps.run import run as run
 from synchain.runtime.sweeps.stream import stream as stream
+from synchain.runtime.sweeps.work_precision import work_precision as work_precision
 from synchain.runtime.synchronisation.basin import basin as basin
 from synchain.runtime.synchronisation.criterion import Criterion as Criterion
 from synchain.runtime.synchronisation.critical import critical as critical

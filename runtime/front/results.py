@@ -33,6 +33,7 @@ HOMES = {
     "Thresholds": "runtime.synchronisation.threshold",
     "Transition": "runtime.synchronisation.transition",
     "TransitionCheck": "runtime.synchronisation.transition",
+    "WorkPrecision": "runtime.sweeps.work_precision",
 }
 
 __all__ = list(HOMES)

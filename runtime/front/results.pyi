@@ -19,6 +19,7 @@ from synchain.runtime.sweeps.compiled import CompiledRun as CompiledRun
 from synchain.runtime.sweeps.errors import SweepFailed as SweepFailed
 from synchain.runtime.sweeps.errors import SweepInterrupted as SweepInterrupted
 from synchain.runtime.sweeps.stream import Streamed as Streamed
+from synchain.runtime.sweeps.work_precision import WorkPrecision as WorkPrecision
 from synchain.runtime.synchronisation.basin import Basin as Basin
 from synchain.runtime.synchronisation.critical import Critical as Critical
 from synchain.runtime.synchronisation.exponent_windows import ExponentWindows as ExponentWindows

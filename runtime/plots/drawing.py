@@ -24,6 +24,7 @@ from ..stability.lyapunov import Lyapunov
 from ..stability.msf import MSF, Plane
 from ..sweeps.run import run
 from ..sweeps.stream import Streamed
+from ..sweeps.work_precision import WorkPrecision
 from ..synchronisation.basin import Basin
 from ..synchronisation.critical import Critical
 from ..synchronisation.mismatch import Mismatch
@@ -324,4 +325,18 @@ def _(value: Critical, axes: Axes, **style: Any) -> Axes:
     bands(axes, [(float(value.value - value.error), float(value.value + value.error))])
     axes.axvline(float(value.value), color=ORANGE, linewidth=0.9)
     axes.set(xlabel=symbol(value.name), ylabel="largest exponent per unit of time")
+    return axes
+
+
+@_draw.register
+def _(value: WorkPrecision, axes: Axes, **style: Any) -> Axes:
+    """Draw time over error, a line for each integrator; the grey band has errors below the reference's."""
+    for name, seconds, error in zip(value.integrator, value.seconds, value.error, strict=True):
+        axes.loglog(error, 1e3 * seconds, **line_style(style, marker="o", label=name))
+    low = np.nanmin(value.error[value.error > 0], initial=1.0)
+    if value.reference_error > low:
+        bands(axes, [(low, value.reference_error)])
+    axes.invert_xaxis()
+    axes.set(xlabel="largest relative error of the final states", ylabel="CPU time (ms)")
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
     return axes
