@@ -10,7 +10,7 @@ _DIGITS = 9
 
 TAKEN = frozenset(
     {"atol_used", "cell", "component", "drive_phase", "end", "end_time", "ended_early", "event", "event_after", "event_before", "event_count",
-     "event_node", "event_row", "event_time", "integrator", "method_steps", "methods",
+     "event_impacts", "event_node", "event_resets", "event_row", "event_slips", "event_time", "integrator", "method_steps", "methods",
      "node", "part", "periods_skipped", "point", "realisation", "rejected", "rtol_used", "sample", "section", "section_count",
      "section_time", "start_state", "start_time", "status", "steps", "sync_error", "sync_error_end", "sync_error_max", "time",
      "trajectory",

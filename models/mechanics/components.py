@@ -74,6 +74,15 @@ class Node:
         return (*(e.mode for e in self.events), *(row.mode for row in self.rows if row.law is not Law.RESET))
 
     @property
+    def held(self) -> tuple[tuple[sp.Symbol, sp.Symbol], ...]:
+        """Pairs of a state and a mode: the state is zero while the mode is, such as a speed in stick on a ground at rest."""
+        pairs = []
+        for row in self.rows:
+            zeros = {Law.SIGN: (row.level,), Law.STOP: (row.level, row.speed), Law.RESET: ()}[row.law]
+            pairs += [(s, row.mode) for e in zeros for s in self.continuous if e != 0 and (e / s).is_number]
+        return tuple(pairs)
+
+    @property
     def conditions(self) -> tuple[Event | Row, ...]:
         """Events and rows."""
         return (*self.events, *self.rows)

@@ -14,6 +14,7 @@ from synchain.codegen.kernels.observable_functions import Recording, with_rows
 from synchain.models.dynamics.observable import ENERGY, ObservedWindow
 from synchain.models.dynamics.observable_text import as_value
 from synchain.models.dynamics.record import Record
+from synchain.models.mechanics.rows import Law, Row
 from synchain.models.scenes.energy import energy_terms as exact_energy
 from synchain.models.scenes.observables import has_own_energy
 from synchain.models.scenes.scene import Scene, Section
@@ -135,18 +136,7 @@ class Sections:
         """Yield names, dimensions and values of the variables out of points (cells, room, 1 + width)."""
         room = max(most, 1)
         if Record.EVENTS in self.scene.record:
-            events = np.full((len(points), room, 4), np.nan)
-            width = min(room, points.shape[1])
-            events[:, :width] = points[:, :width]
-            known = np.isfinite(events[:, :, 1])
-            owners = np.array(self.owners, dtype=float).reshape(-1, 2)
-            rows = owners[np.where(known, events[:, :, 1], 0).astype(int)]
-            yield "event_count", (), np.isfinite(points[:, :, 0]).sum(axis=1).astype(np.int32)
-            yield "event_time", ("event",), events[:, :, 0]
-            yield "event_node", ("event",), np.where(known, rows[:, :, 0] + 1, np.nan)
-            yield "event_row", ("event",), np.where(known, rows[:, :, 1] + 1, np.nan)
-            yield "event_before", ("event",), events[:, :, 2]
-            yield "event_after", ("event",), events[:, :, 3]
+            yield from self._events(points, room)
         for k, (name, section) in enumerate(self.scene.sections.items()):
             # Move the points of this section to the front, in order, without the column of the section's number.
             belongs = points[:, :, 1] == k
@@ -159,6 +149,41 @@ class Sections:
             yield f"{name}_time", ("point",), rows[:, :, 0]
             if _kept(section):
                 yield name, ("point", f"{name}_kept"), rows[:, :, 1:]
+
+    def _events(self, points: np.ndarray, room: int) -> Iterator[tuple[str, tuple[str, ...], np.ndarray]]:
+        """Yield the variables of the record of events, cell by cell in the order of time."""
+        known = np.isfinite(points[:, :, 1])
+        place = np.where(known, points[:, :, 1], 0).astype(int)
+        laws = np.array([law.value for law in self._laws])[place]
+        node, row = np.moveaxis(np.array(self.owners).reshape(-1, 2)[place], -1, 0)
+        before, after = points[:, :, 2], points[:, :, 3]
+
+        # a contact that touches the limit of its mode and stays in it has no event
+        known &= (laws != Law.SIGN) | (before != after)
+        order = np.argsort(~known, axis=1, kind="stable")[:, :room]
+        columns = {"time": points[:, :, 0], "node": node + 1.0, "row": row + 1.0, "before": before, "after": after}
+        yield "event_count", (), known.sum(axis=1).astype(np.int32)
+        for name, column in columns.items():
+            values = np.full((len(points), room), np.nan)
+            values[:, : order.shape[1]] = np.take_along_axis(np.where(known, column, np.nan), order, axis=1)
+            yield f"event_{name}", ("event",), values
+
+        # numbers of each node: impacts on open stops, starts of slip, resets
+        happened = {
+            "impacts": (Law.STOP, before == 1.0),
+            "slips": (Law.SIGN, (before == 0.0) & (after != 0.0)),
+            "resets": (Law.RESET, known),
+        }
+        for name, (law, holds) in happened.items():
+            if law in self._laws:
+                counted = [(known & holds & (laws == law) & (node == i)).sum(axis=1) for i in range(self.scene.n)]
+                yield f"event_{name}", ("node",), np.stack(counted, axis=1).astype(np.int32)
+
+    @cached_property
+    def _laws(self) -> list[Law]:
+        """The law of each contact or row in the order of `owners`."""
+        conditions = ((self.scene.equations.node_at(i).conditions[a]) for i, a in self.owners)
+        return [condition.law if isinstance(condition, Row) else Law.SIGN for condition in conditions]
 
     @cached_property
     def owners(self) -> list[tuple[int, int]]:

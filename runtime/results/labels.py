@@ -61,6 +61,9 @@ MEANINGS = {
     "event_row": "contact, stop, reset or surface of the node, from 1",
     "event_before": "mode before the event: sign of the level, 0 held; of a stop 1 open, 0 closed",
     "event_after": "mode after the event",
+    "event_impacts": "number of impacts on the stops of each node",
+    "event_slips": "number of times that the contacts and surfaces of each node let go",
+    "event_resets": "number of resets of each node",
     "trajectory": "states at equally spaced times of the window",
     "time": "times of the trajectory",
     "transversal_exponent": "largest transversal exponent of the synchronous state",
@@ -80,7 +83,8 @@ CONVENTIONS = "CF-1.11"
 DIMENSIONLESS = frozenset(
     {
         "steps", "rejected", "periods_skipped", "section_count", "method_steps", "end_time", "drive_phase",
-        "section_time", "event_time", "event_count", "time", "transversal_exponent", "transversal_stderr", "rtol_used",
+        "section_time", "event_time", "event_count",
+        "event_impacts", "event_slips", "event_resets", "time", "transversal_exponent", "transversal_stderr", "rtol_used",
     }
 )  # fmt: skip
 """Variables with the unit "1" in every model: counts, non-dimensional times, and rates per non-dimensional time.
@@ -117,6 +121,7 @@ class States:
     nodes: int
     rows: np.ndarray  # (states,): index of the component of each state in the order of the equations
     columns: np.ndarray  # (states,): node of each state, from 0
+    held: tuple[tuple[int, int], ...] = ()  # places of a state and of the mode that holds it at zero
 
     @classmethod
     def of(cls, scene: Scene) -> States:
@@ -125,10 +130,19 @@ class States:
         holders = [equations.holders(name) for name in equations.components]
         rows = np.repeat(np.arange(len(holders)), [len(nodes) for nodes in holders])
         columns = np.array([node for nodes in holders for node in nodes], dtype=int)
-        return cls(tuple(equations.components), equations.n, rows, columns)
+        held = []
+        for places, node in ((equations.places[i], equations.node_at(i)) for i in range(equations.n)):
+            held += [(places[node.state.index(s)], places[node.state.index(mode)]) for s, mode in node.held]
+        return cls(tuple(equations.components), equations.n, rows, columns, tuple(held))
 
     def table(self, values: np.ndarray) -> np.ndarray:
-        """Return states (…, states) as (…, components, nodes); NaN where a node lacks a component."""
+        """Return states (…, states) as (…, components, nodes); NaN where a node lacks a component.
+
+        A state that a row holds at zero is 0, where integration left its rounding error.
+        """
+        values = np.array(values) if self.held else values
+        for state, mode in self.held:
+            values[values[..., mode] == 0.0, state] = 0.0
         shape = (*values.shape[:-1], len(self.components), self.nodes)
         if values.shape[-1] == shape[-2] * shape[-1]:
             return values.reshape(shape)

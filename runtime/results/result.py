@@ -317,10 +317,13 @@ class Result(_Deferred, HasAnimation, Labelled):
         """Rows of the summary: scene, cells by status, variables."""
         sizes = ", ".join(f"{name} {size}" for name, size in self.data.sizes.items())
         cells = self.scene.cells
+        counts = {name: self.data.get(f"event_{name}") for name in ("impacts", "slips", "resets")}
+        events = ", ".join(f"{int(count.sum())} {name}" for name, count in counts.items() if count is not None)
         return (
             ("scene", str(self.data.attrs.get("title", repr(self.scene)))),
             ("cells", self.message if cells > 1 else self.message.removeprefix("1 cell: ")),
             ("integrators", self.integrators),
+            *((("events", events),) if events else ()),
             ("dimensions", sizes),
             ("variables", ", ".join(map(str, self.data.data_vars))),
         )
@@ -387,7 +390,7 @@ class Result(_Deferred, HasAnimation, Labelled):
 
     @property
     def events(self) -> xr.Dataset:
-        """The recorded events: time, node and row of the node (from 1), mode of the row before and after.
+        """The recorded events: time, node and row of the node (from 1), mode of the row before and after; their numbers.
 
         Contacts and surfaces have the modes +1, -1 and, while held, 0; a stop is open (1) or closed (0); at a reset both
         modes are 1.  Rows with NaN follow the last event of a cell.

@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 
 import synchain as sc
+from synchain.runtime.cells.observable_arrays import Sections
 
 X, Y, V, T, W = sp.symbols("x y v t w")
 R, SIGN = sp.Rational, sp.sign(sp.Symbol("w"))
@@ -98,6 +99,43 @@ def test_friction_on_a_belt_has_the_same_record() -> None:
         slip, stick = 2 * (np.pi - np.arctan(0.5 / 0.2)), 2 * 0.5 / 0.2
         assert np.diff(found.event_time.values)[:4] == pytest.approx([slip, stick, slip, stick], abs=1e-9)
         assert not scene(block, 1.0, integrator).equations.has_rows
+
+
+def test_numbers_of_events_and_states_that_are_held_at_zero() -> None:
+    """A slider between a stop and a ground at rest: v = 0 to the last bit while it sticks; numbers of events by node."""
+    friction = sc.Friction(-V, load=R(1, 10))
+    block = sc.Lagrangian(V**2 / 2, X**2 / 2, {X: sp.cos(T / 2) / 4}, coordinates={X: V}, friction=SIGN, contact="set-valued",
+                          events=[friction, sc.Stop(X + R(1, 4), R(1, 2))])  # fmt: skip
+    given = scene(block, 40.0, "dop853", n=2, record=("events", "trajectory"), samples=400, coupling="spring on x",
+                  initial={"x": [0.5, 0.3], "v": [0.0, 0.0]})  # fmt: skip
+    result = sc.run(given, sigma=0.1, show_progress=False)
+    held = result.trajectory.sel(component="slip").values == 0.0
+    assert 50 < held.sum() < 700
+    assert (result.trajectory.sel(component="v").values[held] == 0.0).all()
+    found, count = result.events, int(result.events.event_count)
+    rows, before, after = (found[f"event_{name}"].values[:count] for name in ("row", "before", "after"))
+    assert not ((rows == 1) & (before == after)).any()
+    for i in (1, 2):
+        mine = found.event_node.values[:count] == i
+        assert int(found.event_impacts.sel(node=i)) == (mine & (rows == 2)).sum() > 0
+        assert int(found.event_slips.sel(node=i)) == (mine & (rows == 1) & (before == 0.0)).sum() > 0
+    assert (
+        dict(result.summary)["events"]
+        == f"{int(found.event_impacts.sum())} impacts, {int(found.event_slips.sum())} slips"
+    )
+    assert "event_resets" not in result
+
+
+def test_a_contact_that_stays_in_its_mode_has_no_event() -> None:
+    block = sc.Lagrangian(V**2 / 2, X**2 / 2, coordinates={X: V}, friction=SIGN, contact="set-valued",
+                          events=[sc.Friction(-V), sc.Stop(X + 1)])  # fmt: skip
+    points = np.array([[[1.0, 0.0, -1.0, -1.0], [2.0, 0.0, -1.0, 0.0], [3.0, 1.0, 1.0, 1.0], [np.nan] * 4]])
+    variables = {name: values for name, _, values in Sections(scene(block, 1.0, "taylor")).variables(points, 3)}
+    assert int(variables["event_count"][0]) == 2
+    assert variables["event_time"][0].tolist()[:2] == [2.0, 3.0]
+    assert np.isnan(variables["event_time"][0][2])
+    assert variables["event_impacts"].tolist() == [[1]]
+    assert variables["event_slips"].tolist() == [[0]]
 
 
 def test_refusals() -> None:
