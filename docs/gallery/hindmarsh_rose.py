@@ -47,8 +47,8 @@ region = sc.plane(six, k=np.linspace(0, 1, 21), g=np.linspace(0, 0.3, 16), start
 # Check
 # -----
 # Five neurons with two layers are compared with SciPy.  The exponent must change its sign between g k = 1.2 and 1.3 for
-# the modes of all graphs.  It must do so in the plane too, without electrical synapses (k = 0), where each neuron
-# receives five signals.
+# the modes of all graphs.  It must change its sign in the plane too, without electrical synapses (k = 0), where each
+# neuron receives five signals.
 from scipy.integrate import solve_ivp
 
 star, path = (np.array(graph.matrix, dtype=float) for graph in (sc.graphs.star(5), sc.graphs.chain(5)))
