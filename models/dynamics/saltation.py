@@ -14,6 +14,7 @@ Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (S
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -207,32 +208,34 @@ def _force_slope(slope: sp.Matrix) -> sp.Expr:
 def of_mode(
     equations: Equations,
     orbit: Equations,
-    slope: sp.Matrix,
-    strength: tuple[sp.Symbol, sp.Symbol],
+    slopes: Sequence[sp.Matrix],
+    strengths: Sequence[sp.Matrix],
     links: Sequence[Sequence[sp.Matrix]],
 ) -> Events | None:
     """Return the events of a mode of the synchronous orbit, on which the forces of links vanish.
 
-    links: what the links add to the rates of the mode while no row is held (`of_rows`); two by two in the plane.
+    slopes, strengths: H and the matrix of strengths of each layer (`variational.mode`).
+    links: what the links add to the rates of the mode while no row is held (`of_rows`).
     """
     if not orbit.sticks:
         return None
     if orbit.has_rows:
         return of_rows(orbit, links)
-    plane = len(links) > 1
     releases = _releases(orbit)
     if releases:
         _check_springs(equations.edges)
-    alpha, beta = strength
-    turned = _force_slope(slope).xreplace(orbit.at_node(0))
+    turned = [_force_slope(slope).xreplace(orbit.at_node(0)) for slope in slopes]
+    coordinates = range(len(links))
 
     def entries(side: _Release) -> tuple[Entry, ...]:
         # The gradient of a mode is the gradient of one node minus strength times the slope of the link force.
-        real = side.lead * (side.alone - alpha * turned)
-        aside = side.lead * beta * turned
-        return (((1, 0), real), ((1, 2), aside), ((3, 0), -aside), ((3, 2), real)) if plane else (((1, 0), real),)
+        table = {}
+        for k, j in itertools.product(coordinates, repeat=2):
+            pulled = sum((s[k, j] * force for s, force in zip(strengths, turned, strict=True)), sp.S.Zero)
+            table[2 * k + 1, 2 * j] = side.lead * (side.alone * int(k == j) - pulled)
+        return tuple(table.items())
 
-    return Events((-1, 0, -1, 0) if plane else (-1, 0), tuple((entries(up), entries(down)) for up, down in releases))
+    return Events((-1, 0) * len(links), tuple((entries(up), entries(down)) for up, down in releases))
 
 
 def of_network(equations: Equations, names: Sequence[str] = ()) -> Events | None:

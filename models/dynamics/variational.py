@@ -6,6 +6,7 @@ any number of deviations are integrated along one orbit.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -98,7 +99,7 @@ def expect_continuous(orbit: Equations) -> None:
             )
 
 
-def mode(equations: Equations, plane: bool = False, by_weight: bool = False) -> Variation:
+def mode(equations: Equations, plane: bool = False, by_weight: bool = False, size: int = 1) -> Variation:
     """Return the variational equation of one transversal mode along the synchronous orbit.
 
     With `by_weight` the strength is alpha = -gamma: links may have any parameters, but no inertia.
@@ -107,6 +108,8 @@ def mode(equations: Equations, plane: bool = False, by_weight: bool = False) -> 
     J is the Jacobian of one node; `source_slopes` returns H.
 
     * Several layers l of links with a common eigenvector: d' = (J - sum of alpha_l H_l) d, one strength for each layer.
+    * Layers without common eigenvectors: a mode has `size` coordinates k, d_k' = J d_k - sum of alpha_lkj H_l d_j, where
+      alpha_l = -sigma_l B_l and the matrices B_l are those of the G_l on an invariant subspace.
     * Links with inertia: the strength is tau = alpha/(1 + b alpha) (`synchain.models.dynamics.mode_inertia`).
     * Links h that act between equal states: the synchronous orbit is s' = F(s) + sigma k h(s, s), where k is the sum of
       the weights at every node.  J is the Jacobian of this equation: d' = (DF + sigma k D1h + sigma lambda D2h) d with
@@ -114,7 +117,8 @@ def mode(equations: Equations, plane: bool = False, by_weight: bool = False) -> 
 
     References
     ----------
-    Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); several layers: Sorrentino, New J. Phys. 14, 033035 (2012).
+    Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); several layers: Sorrentino, New J. Phys. 14, 033035 (2012), and
+    Zhang & Motter, SIAM Rev. 62, 817 (2020).
     """
     equations = equations.projected
     node = synchronous_node(equations)
@@ -127,24 +131,36 @@ def mode(equations: Equations, plane: bool = False, by_weight: bool = False) -> 
     node = replace(node, parameters=(*node.parameters, *sorted(more, key=lambda s: s.name)))
     orbit = Equations.of_equal_nodes(node, None, 1)
 
-    # d' = (J - sum of alpha_l H_l) d; in the plane of complex strengths d' = (J - (alpha + i beta) H) d by real parts.
+    # the strength of each layer is a matrix: alpha alone, [[alpha, -beta], [beta, alpha]] for the real and imaginary
+    # parts of a deviation, or one number for each pair of coordinates
+    def symbols(s: sp.Symbol) -> list[sp.Symbol]:
+        return [sp.Symbol(f"{s.name}_{k + 1}", real=True) for k in range(len(slopes))] if len(slopes) > 1 else [s]
+
+    alphas, betas = map(symbols, MODE)
+    if size > 1:
+        pairs = list(itertools.product(range(1, size + 1), repeat=2))
+        of_layers = [[sp.Symbol(f"{s.name}_{k}_{j}", real=True) for k, j in pairs] for s in alphas]
+        strengths, alphas = [sp.Matrix(size, size, row) for row in of_layers], list(itertools.chain(*of_layers))
+    elif plane:
+        strengths, alphas = [sp.Matrix([[a, -b], [b, a]]) for a, b in zip(alphas, betas, strict=True)], alphas + betas
+    else:
+        strengths = [sp.Matrix([[a]]) for a in alphas]
+
     here = orbit.at_node(0)
-    size = len(node.continuous)
-    jacobian = sp.Matrix(node.jacobian())[:size, :size].xreplace(here)
-    pushes = [slope[:size, :size].xreplace(here) for slope in slopes]
-    alphas, betas = ((s,) for s in MODE)
-    if len(slopes) > 1:
-        alphas, betas = (tuple(sp.Symbol(f"{s.name}_{k + 1}", real=True) for k in range(len(slopes))) for s in MODE)
-    real = jacobian - sum((s * push for s, push in zip(alphas, pushes, strict=True)), sp.zeros(size, size))
-    aside = sum((s * push for s, push in zip(betas, pushes, strict=True)), sp.zeros(size, size))
-    free = dict.fromkeys(orbit.symbols(0)[size:], sp.S.One)
-    turned, crossed = (jacobian - real).xreplace(free), aside.xreplace(free)
-    links = [[turned, -crossed], [crossed, turned]] if plane else [[turned]]
-    events = of_mode(equations, orbit, slopes[0], MODE, links)
-    if not plane:
-        return Variation(orbit, size, _entries(real), alphas, events)
-    both = sp.Matrix(sp.BlockMatrix([[real, aside], [-aside, real]]))
-    return Variation(orbit, 2 * size, _entries(both), (*alphas, *betas), events)
+    components, count = len(node.continuous), strengths[0].rows
+    zero = sp.zeros(components, components)
+    jacobian = sp.Matrix(node.jacobian())[:components, :components].xreplace(here)
+    pushes = [slope[:components, :components].xreplace(here) for slope in slopes]
+    links = [
+        [sum((s[k, j] * push for s, push in zip(strengths, pushes, strict=True)), zero) for j in range(count)]
+        for k in range(count)
+    ]
+    matrix = sp.Matrix(
+        sp.BlockMatrix([[jacobian * int(k == j) - links[k][j] for j in range(count)] for k in range(count)])
+    )
+    free = dict.fromkeys(orbit.symbols(0)[components:], sp.S.One)
+    events = of_mode(equations, orbit, slopes, strengths, [[link.xreplace(free) for link in row] for row in links])
+    return Variation(orbit, count * components, _entries(matrix), tuple(alphas), events)
 
 
 def network_variation(equations: Equations, names: Sequence[str] = ()) -> Variation:

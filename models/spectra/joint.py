@@ -151,17 +151,29 @@ def _check(graphs: Sequence[Matrix]) -> None:
         return
     if sizes[0] > DENSE_LIMIT:
         raise ValueError(f"joint spectrum: found {sizes[0]} nodes; expected at most {DENSE_LIMIT} for several graphs")
+    if pair := _apart(tuple(graphs)):
+        first, second = (f"{graph.name}({graph.n})" for graph in pair)
+        raise ValueError(
+            f"joint spectrum of {first} and {second}: found matrices that do not commute; expected graphs with common "
+            "modes, such as any undirected graph and a complete one; clusters(graphs, [0, 0, …]) has the blocks of others"
+        )
+
+
+@lru_cache(maxsize=32)
+def _apart(graphs: tuple[Matrix, ...]) -> tuple[Matrix, Matrix] | None:
+    """Return the first two graphs whose matrices do not commute, or None."""
     itself = fmpq_poly([0, 1])
     # Matrices scaled to integers commute exactly if the matrices themselves do.
-    matrices = [value_at(graph, itself) for graph in graphs]
-    for i, first in enumerate(matrices):
-        for j in range(i):
-            if matrices[j] * first != first * matrices[j]:
-                raise ValueError(
-                    f"joint spectrum of {graphs[j].name}({sizes[0]}) and {graphs[i].name}({sizes[0]}): found matrices that do "
-                    "not commute; expected graphs with common modes, such as any undirected graph and a complete one; "
-                    "cluster_exponents takes other layers, with one cluster of all nodes for complete synchronisation"
-                )
+    matrices = [value_at(graph, itself) for graph in graphs] if len(graphs) > 1 else []
+    pairs = ((j, i) for i in range(len(matrices)) for j in range(i))
+    return next(
+        ((graphs[j], graphs[i]) for j, i in pairs if matrices[j] * matrices[i] != matrices[i] * matrices[j]), None
+    )
+
+
+def commute(graphs: Sequence[Matrix]) -> bool:
+    """Return True if the matrices of graphs on the same nodes commute, so that they have joint eigenvalues."""
+    return len(graphs) == 1 or graphs[0].n > DENSE_LIMIT or _apart(tuple(graphs)) is None
 
 
 def _joined(modes: Modes, combined: Matrix, graph: Matrix) -> tuple[Modes, Matrix]:

@@ -45,6 +45,8 @@ class Transversal:
             try:
                 modes = transversal_modes(scene)
                 gamma = np.array([mode.values for mode in modes])
+                if gamma.ndim > 2:
+                    raise ValueError("layers that do not commute")
                 labels = tuple(f"eigenvalue {', '.join(f'{value:.10g}' for value in mode.values)}" for mode in modes)
                 one = cls(scene, classes, labels, gamma, np.array([m.multiplicity for m in modes]))
                 _mode(without_drive(scene.equations, scene.parameters), bool(np.iscomplexobj(gamma)))

@@ -59,8 +59,8 @@ class Exponents(Labelled):
 
     Parameters
     ----------
-    alpha : ndarray, shape (m,) or (m, layers)
-        Strengths, real or complex; with several layers of links, one column for each layer.
+    alpha : ndarray, shape (m,), (m, layers) or (m, layers, size, size)
+        Strengths, real or complex; with several layers of links, one column for each layer, or a matrix.
     exponent : ndarray, shape (m,)
         Exponents per unit of non-dimensional time.
     stderr : ndarray, shape (m,)
@@ -101,7 +101,7 @@ class Exponents(Labelled):
     @property
     def data(self) -> xr.Dataset:
         """Exponents and their errors over the modes, with alpha and beta as coordinates."""
-        dims = ("mode", "layer")[: self.alpha.ndim]
+        dims = ("mode", "layer", "row", "column")[: self.alpha.ndim]
         modes = {"alpha": (dims, self.alpha.real)}
         if np.iscomplexobj(self.alpha):
             modes["beta"] = (dims, self.alpha.imag)
@@ -338,9 +338,11 @@ def exponents(
     ----------
     scene : Scene
         Source of the oscillator and the coupling; a lone oscillator gets a partner.
-    alpha : array_like, shape (m,) or (m, layers)
+    alpha : array_like, shape (m,), (m, layers) or (m, layers, size, size)
         Strengths alpha + i beta = -sigma gamma, real or complex. With several layers of links, one column for each
-        layer; gamma is then the eigenvalue of the layer on a mode common to all layers.
+        layer; gamma is then the eigenvalue of the layer on a mode common to all layers. Layers that do not commute have
+        blocks of several differences: alpha is then a real matrix for each layer, -sigma times its matrix on the block
+        (`synchain.graphs.clusters`).
     {average}
     {starts}
     {progress}
@@ -371,7 +373,7 @@ def exponents(
     Raises
     ------
     ValueError
-        If the network has no coupling, if the coupling has no synchronous state, if time enters the equations
+        If the network has no coupling, if strengths do not fit the layers, if the coupling has no synchronous state, if time enters the equations
         without a known period, or if the scene has a stop, draws, or axes that change the synchronous orbit. The
         strength of links that vanish between equal states does not change the orbit.
     FloatingPointError
@@ -388,7 +390,7 @@ def exponents(
     execution = Execution(workers, None, show_progress, progress)
     averaging = Averaging.for_scene(scene, precision, periods, transient, rng, execution)
     asked = numbers("alpha", alpha, complex_too=True)
-    of_layers = asked.ndim == 2 and len(check_scene(scene).model.linked) > 1
+    of_layers = asked.ndim in (2, 4) and len(check_scene(scene).model.linked) > 1
     strengths = row_of("alpha", asked.ravel() if of_layers else asked, complex_too=True)
     return transversal(
         given, scene, strengths.reshape(asked.shape) if of_layers else strengths, starts, rtol, averaging

@@ -164,4 +164,4 @@ def _flow(problem: OrbitProblem, state: np.ndarray, period: float) -> tuple[np.n
     """Return the state one period later, and its derivative with respect to the state."""
     integrator = problem.integrator(state[None])
     propagators, logarithms = problem.propagators(integrator, period / problem.unit)
-    return integrator.state[0], propagators[0, 0].real * float(np.exp(logarithms[0, 0]))
+    return integrator.state[0], propagators[0, 0, : len(state), : len(state)].real * float(np.exp(logarithms[0, 0]))

@@ -345,7 +345,8 @@ class Plane(Labelled):
     names : (str, str)
         Names of the axes: "alpha", "beta", or parameters.
     modes : tuple of str
-        Over two parameters, the exact eigenvalues of each transversal mode, one for each layer.
+        Over two parameters, the exact eigenvalues of each transversal mode, one for each layer; for layers that do not
+        commute, the nodes of each block of differences.
     mode : ndarray of int, shape (a, b), optional
         Index in `modes` of the mode with the largest exponent.
     strengths : tuple of str
@@ -612,8 +613,7 @@ def plane(
     Parameters
     ----------
     scene : Scene
-        Source of the oscillator and the coupling. Over two parameters, a network; the matrices of its layers must
-        commute.
+        Source of the oscillator and the coupling. Over two parameters, a network.
     alpha : array_like, shape (a,), optional
         Increasing real parts.
     beta : array_like, shape (b,), optional
@@ -632,8 +632,7 @@ def plane(
     Raises
     ------
     ValueError
-        If there are not two axes, if the values of an axis do not increase or have no effect, if the matrices of the
-        layers do not commute, and as in `exponents`.
+        If there are not two axes, if the values of an axis do not increase or have no effect, and as in `exponents`.
     FloatingPointError
         If an integration fails.
 

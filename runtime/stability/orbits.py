@@ -56,8 +56,8 @@ class OrbitProblem:
 
     scene: Scene  # oscillator, coupling and numerical settings
     variation: Variation  # equations of the orbit and of its deviations
-    # (m,) or (m, layers), real or complex: strengths of the deviations; for modes of links without inertia, alpha + i
-    # beta
+    # (m,) or (m, entries), real or complex: strengths of the deviations; for modes of links without inertia, alpha + i
+    # beta of each layer, or the entries of matrices of alpha
     strengths: np.ndarray
     turns: Turns  # the unit of time, and the extent of the motion; an extent of 0 has not been measured
     method: Integrator  # the integrator for all strengths
@@ -87,19 +87,23 @@ class OrbitProblem:
     ) -> OrbitProblem:
         """Return the problem of transversal modes; measure the unit of time of undriven motion from the first start.
 
-        Shapes: strengths (m,) or (m, layers), starts (starts, components).
+        Shapes: strengths (m,), (m, layers), or (m, layers, size, size) of modes with `size` coordinates each; starts
+        (starts, components).
         """
         scene = scene if scene.model.linked else _joined(scene, strengths)
         equations = without_drive(scene.equations, scene.parameters)
         if np.any(strengths):
             check_links_of_events(equations)
-        variation, layers = _variation(equations, bool(np.iscomplexobj(strengths))), len(equations.layers)
-        if strengths.size != len(strengths) * layers:
+        layers, size = len(equations.layers), strengths.shape[-1] if strengths.ndim == 4 else 1
+        if strengths.size != len(strengths) * layers * size**2 or (size > 1 and np.iscomplexobj(strengths)):
             raise ValueError(
                 f"transversal modes: found {layers} layer{'s' * (layers > 1)} of links, so that a mode has as many strengths; expected "
                 "one for each; `plane` takes the strengths of layers as axes, e.g. plane(scene, k=[0, 1], g=[0, 1])"
             )
-        columns = len(variation.orbit.node.continuous)
+        variation = _variation(equations, bool(np.iscomplexobj(strengths)), size)
+        if strengths.ndim == 4:
+            strengths = strengths.reshape(len(strengths), -1)
+        columns = variation.size // (2 if np.iscomplexobj(strengths) else 1)
         problem = cls.of(scene, variation, _of_modes(scene, strengths), starts, columns, workers, turns)
         if turns or problem.forced or problem.linear:
             return problem
@@ -139,7 +143,7 @@ class OrbitProblem:
     @property
     def components(self) -> int:
         """State variables of one deviation, real or complex."""
-        return len(self.variation.orbit.node.continuous)
+        return self.variation.size // (2 if np.iscomplexobj(self.strengths) else 1)
 
     @property
     def parameter_values(self) -> np.ndarray:
@@ -319,9 +323,9 @@ def _parameter_values(scene: Scene, orbit: Equations) -> np.ndarray:
 
 
 @lru_cache(maxsize=16)
-def _variation(equations: Equations, plane: bool) -> Variation:
+def _variation(equations: Equations, plane: bool, size: int) -> Variation:
     """Return the variational equation of a mode; cached, as every Newton step needs the equation."""
-    return mode(equations, plane=plane)
+    return mode(equations, plane, size=size)
 
 
 @lru_cache(maxsize=16)

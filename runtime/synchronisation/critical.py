@@ -182,7 +182,7 @@ def critical(
     Parameters
     ----------
     scene : Scene
-        The network; the matrices of its layers must commute.
+        The network.
     name : str
         Name of the parameter.
     between : (float, float)

@@ -10,12 +10,14 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from synchain import Rates, Scene, ends, exponents, msf, open_result, plane, run
+from synchain import Field, Rates, Scene, critical, ends, exponents, lyapunov_spectrum, msf, open_result, plane, run
 from synchain.graphs import Topology, chain, circulant, complete, from_matrix, ring, star, topology
 from synchain.models.definitions.loader import load_oscillator
 from synchain.runtime.stability.interpolation import exact_interpolation, strength_interpolation
 from synchain.runtime.stability.march import BlockInterpolation, March
 from synchain.runtime.stability.orbits import OrbitProblem
+from synchain.runtime.stability.transversal_modes import transversal_modes
+from synchain.runtime.sweeps.certify import certify
 
 TARGET, SOURCE, W = ends(load_oscillator("duffing"))
 K, C, G = sp.symbols("k c g")
@@ -108,6 +110,36 @@ def test_whole_networks_by_scipy() -> None:
         assert result.exponent[x, y] == pytest.approx(transversal(scene.replace(k=k[x], g=g[y])), abs=2e-8)
     assert result.attractors.shape == (1, 2, 1)
     assert result.data.attractor.dims == ("g", "start")
+
+
+@pytest.mark.parametrize("graphs", [(ring(4), star(4)), (chain(5), star(5))])
+def test_layers_that_do_not_commute_by_scipy(graphs: tuple[Topology, Topology]) -> None:
+    """Blocks of one and two differences, or of all four: the largest exponent is that of the whole network."""
+    scene = layered(*graphs, omega=1.3)
+    k, c = np.array([-0.3, 0.5]), np.array([0.02, 0.4])
+    result = plane(scene, k=k, c=c, rtol=1e-10, starts=1, transient=100)
+    for x, y in ((0, 0), (0, 1), (1, 0)):
+        assert result.exponent[x, y] == pytest.approx(transversal(scene.replace(k=k[x], c=c[y])), abs=2e-8)
+    assert result.modes[-1] == f"({'2' if graphs[0].n == 4 else '4'} differences of the nodes 1 … {graphs[0].n})"
+    blocks = np.array([mode.values for mode in transversal_modes(scene)])
+    strengths = -np.array([0.5, 0.02])[:, None, None] * blocks
+    alone = exponents(scene, strengths, rtol=1e-10, starts=1, transient=100)
+    assert alone.exponent.max() == pytest.approx(result.exponent[1, 0], abs=1e-12)
+    assert alone.data.alpha.dims == ("mode", "layer", "row", "column")
+
+
+def test_chaos_of_layers_that_do_not_commute() -> None:
+    """The spectrum of the whole network has two exponents of the synchronous motion, then the largest one across."""
+    node = Field({"x": "-y - z", "y": "x + 0.2*y", "z": "0.2 + z*(x - 9)"}, initial={"x": 1.0, "z": 1.0})
+    of_x, of_y = Rates({"x": "k*W*(x_j - x_i)"}, {"k": 0.15}), Rates({"y": "g*W*(y_j - y_i)"}, {"g": 0.2})
+    scene = Scene(node, links=[(of_x, ring(4)), (of_y, star(4))], initial={"x": 1.0, "y": 0.0, "z": 1.0})
+    found, spectrum = certify(scene), lyapunov_spectrum(scene, count=3, precision=2e-3, show_progress=False)
+    assert found.exponent[0] == pytest.approx(
+        spectrum.exponent[2], abs=3 * np.hypot(found.stderr[0], spectrum.stderr[2])
+    )
+    assert -0.2 < found.exponent[0] < -10 * found.stderr[0]
+    zero = critical(scene, "k", between=(0.0, 0.15), g=0.05, precision=3e-3, starts=1, show_progress=False)
+    assert zero.modes == ("(1 difference of the nodes 2, 4)",)
 
 
 def test_a_parameter_of_the_orbit_beside_alpha() -> None:
@@ -273,7 +305,8 @@ ALONE = Scene("duffing", SPRING, ring(4))
         (lambda: msf(SCENE, [0, 1]), "found 2 layers of links"),
         (lambda: plane(ALONE, [0, 1], k=[0, 1]), "expected another parameter: alpha = -k gamma"),
         (lambda: plane(Scene("duffing"), delta=[0, 1], omega=[1, 2]), "a scene without links"),
-        (lambda: plane(layered(ring(4), star(4)), k=[0, 1], c=[0, 1]), "matrices that do not commute"),
+        (lambda: exponents(layered(ring(4), star(4)), np.zeros((2, 2, 2, 3))), "expected one for each"),
+        (lambda: plane(layered(chain(18), star(18)), k=[0, 1], c=[0, 1]), "blocks of 17 differences; expected at most 16"),
         (lambda: plane(layered(ring(4), chain(4), PULL), k=[0, 1], g=[0, 1]), "sums of weights differ from node"),
         (lambda: plane(Scene("friction", "spring", ring(4), contact="set-valued"), sigma=[0, 1], kappa=[1, 2]), "kappa"),
     ],
