@@ -4,15 +4,16 @@ Chimeras that rest, breathe and breathe slowly
 
 Abrams, Mirollo, Strogatz & Wiley, Physical Review Letters 101, 084103 (2008).
 
-Two populations of equal phases with links :math:`\mu = (1 + A)/2` inside and :math:`\nu = (1 - A)/2` between them, and
-the lag :math:`\pi/2 - \beta`, β = 0.1.  One population moves as one, the other does not.  Fig. 2 shows the order r of
-the second: at A = 0.2 it comes to rest (a stable chimera), at A = 0.28 and 0.35 it breathes.  So it varies at
-none, and at both, of these strengths.
+Two populations of equal phases have links of the strength :math:`\mu = (1 + A)/2` inside each population, links of the
+strength :math:`\nu = (1 - A)/2` between them, and the lag :math:`\pi/2 - \beta`, β = 0.1.  In a chimera state, one
+population synchronises and the other does not.  Fig. 2 shows the order parameter r of the second population.  At A =
+0.2 it becomes constant (a stable chimera).  At A = 0.28 and 0.35 it oscillates (a breathing chimera).
 
-Each of our populations has 32 phases.  They start on a Poisson kernel and stay on one, so that r obeys the equations of
-the limit of many phases, which the paper studies.
+Our populations have 32 phases each, distributed by a Poisson kernel.  For this distribution, r obeys the equations of
+the limit of infinitely many phases, which the paper studies.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
 import sympy as sp
 
@@ -38,4 +39,7 @@ claims = {
 claims["order of the other population"] = (1.0, min(r[:, 0].min() for r in order), 1e-3)
 reproduction = sc.results.Reproduction(claims)
 print(reproduction)
-result.plot(kind="space")
+for A, r in zip(strengths, order, strict=True):
+    plt.plot(result.time, r[:, 1], label=f"A = {A}")
+plt.gca().set(xlabel="time", ylabel="order parameter r of the second population")
+plt.legend()

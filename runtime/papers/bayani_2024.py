@@ -4,12 +4,13 @@ Clusters on the way to synchrony
 
 Bayani et al., Nature Communications 15, 4955 (2024).
 
-Ten Lorenz oscillators (10, 28, 2) with links x → x: which become equal before all are?  Nodes join where the last mode
-that separates them begins to decay.  Fig. 3 prints the strengths of three steps; the exponents of each cluster state
-along its own motion, which the prediction does not use, pass zero within 15 % of them.
+Ten Lorenz oscillators (10, 28, 2) have links x → x.  As the coupling grows, some nodes synchronise before all do.  Two
+nodes join at the strength at which the last mode that separates them begins to decay.  Fig. 3 contains the strengths of
+three steps.  As a check, the exponents of each cluster state are computed along its own motion.  They pass zero within
+15 % of the predicted strengths.
 
-The graph is built from the printed eigenvalues 6, 4 and 1.  Its exact eigenvalues are 6.003, 4.003 and 1, since we give
-the weights three digits.
+The graph is built from the printed eigenvalues 6, 4 and 1.  Our weights have three digits, so the exact eigenvalues are
+6.003, 4.003 and 1.
 """
 
 import synchain as sc

@@ -4,13 +4,12 @@ Links on triangles synchronise as links on edges
 
 Gambuzza et al., Nature Communications 12, 1255 (2021).
 
-Links of three ends act through a Laplacian of their own.  Where a link on a triangle whose other ends are equal is a
-link on an edge ("natural" coupling), modes obey one master stability function, whatever joins the nodes.  If all nodes
-are joined, the Laplacian of triangles is N − 2 times that of edges, so that triangles need the (N − 2)th part of the
-strength.
+Links of three ends have a generalised Laplacian.  With "natural" coupling, a link on a triangle equals a link on an
+edge if its two sources are equal.  Modes then obey the same master stability function for triangles and edges.  If all
+N nodes are joined, the Laplacian of the triangles is N − 2 times the Laplacian of the edges.  Triangles therefore need
+a strength that is N − 2 times smaller.
 
-Ours are five Rössler oscillators (0.2, 0.2, 9) with cubic links; both functions are computed, each
-along its own motion.
+This script uses five Rössler oscillators (0.2, 0.2, 9) with cubic links.  It computes both functions.
 """
 
 import numpy as np

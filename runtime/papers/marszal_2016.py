@@ -4,11 +4,11 @@ Thresholds of dry-friction oscillators
 
 Marszal, Saha, Jankowski & Stefański, European Physical Journal Special Topics (2016).
 
-Masses on a moving belt, joined by springs, at ω = 1.15.  The paper measures up to which coupling two, three and four of
-them synchronise.  Ours are zeros of the master stability function, divided by the exact eigenvalues of the chains: the
-synchronous motion is periodic, so that no average is taken.
+Springs join masses on a moving belt, at ω = 1.15.  The paper finds by simulation up to which coupling two, three and
+four masses synchronise.  Our numbers are zeros of the master stability function, divided by the exact eigenvalues of
+the chains.  The synchronous motion is periodic, so the exponents need no averages.
 
-All three agree to the printed digits.  ``synchain paper`` makes the paper's figures.
+All three numbers agree to the printed digits.  ``synchain paper`` makes the paper's figures.
 """
 
 import numpy as np

@@ -4,12 +4,13 @@ The damping that steadies a power grid best
 
 Motter, Myers, Anghel & Nishikawa, Nature Physics 9, 191 (2013).
 
-Small deviations from the synchronous state of equal machines fall apart into modes, :math:`\ddot\xi = -\alpha\xi -
-\beta\dot\xi` with the eigenvalues α of the linearised lines.  The slowest of them decays fastest where β is twice the
-square root of the smallest non-zero α: then at the rate :math:`\sqrt{\alpha_2}`.
+Small deviations from the synchronous state of equal machines separate into modes, :math:`\ddot\xi = -\alpha\xi -
+\beta\dot\xi`.  The numbers α are the eigenvalues of the linearised lines.  The best damping is the β at which the
+slowest mode decays fastest.  It is :math:`\beta = 2\sqrt{\alpha_2}` with the smallest non-zero eigenvalue
+:math:`\alpha_2`, and the rate is then :math:`\sqrt{\alpha_2}`.
 
-The grid of six machines is ours; damping is tried in steps of 2 %.  Below the best damping all modes decay at β/2,
-above it the slowest mode is overdamped.
+We use another grid, of six machines, and change the damping in steps of 2 %.  Below the best damping, all modes decay
+at β/2.  Above it, the slowest mode is overdamped.
 """
 
 import matplotlib.pyplot as plt

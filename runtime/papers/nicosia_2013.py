@@ -4,12 +4,12 @@ Symmetric nodes synchronise from afar
 
 Nicosia, Valencia, Chavez, Díaz-Guilera & Latora, Physical Review Letters 110, 174102 (2013).
 
-Phases with a frustration, :math:`\dot\theta_i = \omega + \sum_j A_{ij} \sin(\theta_j - \theta_i - \alpha)`, cannot all
-be equal where nodes have different numbers of links.  Nodes that a symmetry exchanges become equal although no link
-joins them: the difference is zero.
+Phases with a frustration α obey :math:`\dot\theta_i = \omega + \sum_j A_{ij} \sin(\theta_j - \theta_i - \alpha)`.  They
+cannot all be equal if nodes have different numbers of links.  Nodes that a symmetry exchanges become equal, although no
+link joins them: the difference of their phases is zero.
 
-The graph of seven nodes is ours.  Nodes 1 and 5, and nodes 2 and 4, are mirror images; nodes 3 and 6 have two equal
-neighbours and are none, and their phases differ.
+We use another graph, with seven nodes.  Nodes 1 and 5 are mirror images, and so are nodes 2 and 4.  Nodes 3 and 6 are
+not mirror images, although they have two common neighbours.  Their phases differ.
 """
 
 import numpy as np

@@ -4,13 +4,13 @@ Symmetries of eleven nodes make clusters
 
 Pecora et al., Nature Communications 5, 4079 (2014).
 
-Fig. 1 takes links out of the complete graph of eleven nodes.  Two of its graphs have symmetries, 32 and 5760, whose
-orbits are 5 and 3 clusters.  In the first, two clusters are intertwined: they lose their synchrony together, while
-other clusters may keep theirs.
+The graphs of Fig. 1 are complete graphs of eleven nodes without some links.  Two of these graphs have 32 and 5760
+symmetries.  The symmetries define 5 and 3 clusters.  In the first graph, two clusters are intertwined: they lose their
+synchrony together, while other clusters may remain synchronous.
 
-The paper couples optical maps in discrete time; clusters, and which are intertwined, belong to the graph alone.  The
-figure shows the exponents for Lorenz oscillators (10, 28, 2) with links x → x at σ = 0.86: the two intertwined clusters
-lose their synchrony, the cluster of nodes 4 and 6 keeps its own.
+The paper couples optical maps in discrete time.  Clusters, and the intertwined pairs among them, depend only on the
+graph. The figure shows the exponents for Lorenz oscillators (10, 28, 2) with links x → x at σ = 0.86.  The two
+intertwined clusters lose their synchrony.  The cluster of nodes 4 and 6 remains synchronous.
 """
 
 import synchain as sc

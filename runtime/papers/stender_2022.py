@@ -4,13 +4,13 @@ Shares of five cycles, and of a machine that locks
 
 Stender & Hoffmann, Nonlinear Dynamics 107, 1451 (2022).
 
-Their program bSTAB counts which attractor random starts reach.  Two of its cases: Duffing's oscillator
-:math:`\ddot x = -0.08 \dot x - x^3 + 0.2 \cos t` on [-1, 1] × [-0.5, 1], which has five cycles, told apart by the
-largest x; and the machine at a grid :math:`\ddot\theta = 0.5 - 0.1 \dot\theta - \sin\theta` on [-π, π] × [-10, 10],
-which locks or rotates.
+The program bSTAB counts the attractors that random starts reach.  This script repeats two of its cases.  The first is
+Duffing's oscillator :math:`\ddot x = -0.08 \dot x - x^3 + 0.2 \cos t` on [-1, 1] × [-0.5, 1].  It has five cycles,
+which differ in their largest x.  The second is a machine at a grid, :math:`\ddot\theta = 0.5 - 0.1 \dot\theta -
+\sin\theta`, on [-π, π] × [-10, 10].  It locks or rotates.
 
-The shares are those that bSTAB finds from 10 000 random starts.  We take a grid of 3600 starts; four standard errors
-of the random starts count as agreement.
+bSTAB used 10 000 random starts.  We use a grid of 3600 starts.  Four standard errors of the random starts count as
+agreement.
 """
 
 import numpy as np
