@@ -15,17 +15,16 @@ networkx have that one too: ``path(4) == chain(4)``, ``cycle(5) == ring(5)``.
 Glossary
 --------
 node, link    An oscillator of a network; the influence of node j on node i, with an exact weight.
-kind          Nodes of one kind have the same oscillator, friction law and contact, and equations.
-topology      Nodes and weighted links; adjacency minus degree is the connectivity matrix G.
-family        A rule that makes the topology of any number of nodes: chain, ring, star.
-spectrum      The exact eigenvalues γ of G with their multiplicities; largest first, the first is 0.
-coupling      The terms of a link: an energy, a matrix between states, or any rates of its target.
-layer         The links of one coupling on one graph; a network may have several.
-contact       The jump of friction at rest: smoothed ("atan", steepness κ), or "set-valued".
-slip state    Of a node with set-valued contact: +1 or -1 while it slips, 0 while it sticks.
-quotient      The network of classes of nodes that move alike, which has fewer equations.
-observable    A value of the states, reduced over the nodes and then over the window of a cell.
-record        Output of a run: "sync_error", "section" or "trajectory".
-scene         Model, parameter values, start, records and axes: everything that a run needs.
-cell          One point of the axes of a scene: one initial-value problem.
+kind          A set of nodes with the same oscillator, friction law, contact and equations.
+topology      A graph: nodes and weighted links. Adjacency minus degree is the connectivity matrix G.
+family        A rule that defines a graph for any number of nodes, such as chain, ring or star.
+spectrum      The exact eigenvalues γ of G with their multiplicities, sorted from 0 downwards.
+coupling      The terms of a link: an energy, a matrix between states, or any rates of the target.
+layer         The links of one coupling on one graph; a network may have several layers.
+contact       The treatment of the jump of friction at rest: smoothed ("atan", steepness κ), or "set-valued".
+slip state    State of a node with set-valued contact: +1 or -1 while it slips, 0 while it sticks.
+quotient      A smaller network with one node for each class of equal nodes.
+observable    An average or extreme value of an expression of the states over the window.
+record        Output of a run: "sync_error", "section", "trajectory" or "events".
+scene         All settings of a run: model, parameters, initial states, records and axes.
 """

@@ -10,17 +10,16 @@ Names are loaded on first use, so that the command line starts fast.
 
 Glossary
 --------
-cell          One point of the axes of a scene: one initial-value problem with one status.
-row           The input of a kernel for one cell: parameter values, initial states, span.
-span          Of one cell: the ends of its window, its period, and the error of a synchronous cell.
-block         Cells that are run, stored and resumed as one piece.
-lane          One of the numbers in a SIMD register; each lane integrates another cell.
-transient     Time that is integrated before anything is recorded; the window follows it.
-strength      α = -σγ, real or complex, of an eigenvalue γ of the network and the coupling σ.
+cell          One run of a sweep, with one set of parameters and initial states, and one status.
+row           The input of a kernel for one cell: parameters, initial states, times.
+span          The times of a cell: ends of its window, period of the drive, and the error at which it may end early.
+block         A number of cells that are run, stored and resumed together.
+transient     The time before the recording begins.
+window        In a run, the time of the recording. For σ, a range in which every transversal mode decays.
+strength      α = -σγ, real or complex, for an eigenvalue γ of the network and the coupling σ.
 mode          A deviation from synchrony along an eigenvector of the network.
-interval      A range of strengths with negative exponent.
-window        Of a run: the time that is recorded. Of σ: a range in which every mode dies out.
-verdict       Whether and where a network synchronises, decided from the intervals and the spectrum.
-probe         Two or three oscillators whose simulation stands for a mode of any network.
-certificate   Exponents and verdict of the synchronous state of each cell of a sweep.
+interval      A range of strengths α with negative exponent.
+verdict       Statement whether and where a network synchronises.
+probe         Two or three oscillators whose simulation represents one mode of any network.
+certificate   Exponent and verdict of the synchronous state for each cell of a sweep.
 """
