@@ -30,6 +30,8 @@ class Exported:
         checked = _checked(equations, values)
         model, changed = portable(equations)
         model.expect_pairs(f"export to {language}")
+        if model.joined:
+            raise ValueError(f"export to {language}: found contacts or stops in links; expected links of forces alone")
         check_inertia(model, language)
         numbers = dict(zip(model.parameters, checked.values(), strict=bool(checked)))
 

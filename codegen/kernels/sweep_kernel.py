@@ -207,6 +207,8 @@ def _planned(equations: Equations, method: Integrator, unroll: int, fill: float)
     size = {edge: sum(int(sp.count_ops(e)) for e in edge.rhs) for edge in equations.edges}
     on_links = sum(size[edge] for _, edge in equations.linked()) if equations.n <= LARGEST_UNROLLED else 0
     alone = method.series and (is_large(equations) or (equations.inertial and not equations.link_count))
+    if equations.joined and (equations.n > unroll or method.inexact):
+        unroll = max(unroll, equations.n)
     looped = equations.n > unroll or alone or (not method.inexact and on_links > MOST_OF_LINKS)
     if not looped:
         return equations, None

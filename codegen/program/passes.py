@@ -5,7 +5,7 @@ A fixed part need not be computed again in each loop turn. `Names` supplies numb
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import sympy as sp
@@ -87,6 +87,13 @@ class StraightLine:
         expressions = [*self.results, *(e for _, e in self.statements)]
         used: set[sp.Symbol] = set().union(*(e.free_symbols for e in expressions))
         return used - {s for s, _ in self.statements}
+
+    def at(self, values: Mapping[sp.Symbol, sp.Expr]) -> StraightLine:
+        """Return the same line with other expressions in place of symbols that it reads."""
+        swap = dict(values)
+        return StraightLine(
+            tuple((s, e.xreplace(swap)) for s, e in self.statements), tuple(e.xreplace(swap) for e in self.results)
+        )
 
 
 def share(results: Sequence[sp.Expr], supply: Iterator[sp.Symbol]) -> StraightLine:

@@ -14,7 +14,8 @@ impulse of each row, the correction of its gap, and 1 where a guard fires.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import islice
 
 import sympy as sp
@@ -27,7 +28,7 @@ from synchain.models.mechanics.rows import Law, Row, forces, struck
 
 from ..program.expressions import Compare, Expression, Load, Name, Number, call, plus
 from ..program.lowering import lower
-from ..program.passes import Names, real, share
+from ..program.passes import Names, StraightLine, real, share
 from ..program.statements import Assign, Function, If, Role, Statement, accumulate, let, store
 from .blocks import assigned
 from .contact_step import SIDES, jump_sides, parameter_loads, register, time_gaps
@@ -43,8 +44,15 @@ LEVEL, GAP, MODE, SPEED, RATE, RATIO = range(6)
 
 
 def most_rows(equations: Equations) -> int:
-    """Return the largest number of rows of a node."""
-    return max(len(node.rows) for node in equations.nodes)
+    """Return the largest number of rows of a node, or of a part that links join."""
+    return max(len(rows) for rows in _all_rows(equations))
+
+
+def _all_rows(equations: Equations) -> list[tuple[Row, ...]]:
+    """Return the rows of each node, or of each part that links join."""
+    if equations.joined:
+        return [part.template.rows for part in equations.parts] or [()]
+    return [equations.nodes[kind].rows for kind in equations.kind_of]
 
 
 def contact_groups(equations: Equations) -> int:
@@ -56,8 +64,8 @@ def contact_groups(equations: Equations) -> int:
 
 
 def row_count(equations: Equations) -> int:
-    """Return the number of rows of all nodes."""
-    return sum(len(equations.nodes[kind].rows) for kind in equations.kind_of)
+    """Return the number of rows of all nodes and links."""
+    return sum(map(len, _all_rows(equations)))
 
 
 def row_functions(equations: Equations, names: Names, looped: bool) -> list[Function]:
@@ -132,58 +140,109 @@ class _Writer:
         return self.place(SIDES + group, plus(row if isinstance(row, Expression) else Number(row), Number(2)))
 
 
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """Rows that are solved together, of a node or of a part, with the states that they push and their modes."""
+
+    first: int  # number of the first row
+    rows: tuple[Row, ...]
+    values: Mapping[sp.Symbol, sp.Expr]  # what the symbols of the rows are in the network; empty if the same
+    rates: Mapping[sp.Symbol, sp.Expr]  # symbols of rates in the rows, with their expressions in the network
+    state: tuple[sp.Symbol, ...]  # the continuous states, in the symbols of the rows
+    places: tuple[int, ...]  # their places in the state of the network
+
+    def numbers(self) -> Iterator[tuple[int, Row]]:
+        """Yield each row with its number among the rows of the network."""
+        return enumerate(self.rows, start=self.first)
+
+
 class _WrittenOut(_Writer):
     def pushes(self) -> list[Statement]:
         equations = self.equations
-        columns: list[sp.Expr] = []
-        places: list[Expression] = []
-        for _, first, rows in self.parts():
-            for a, row in enumerate(rows):
-                mode = sp.S.One if row.law is Law.RESET else row.mode
-                columns += (row.level, row.gap, mode, row.speed, row.rate, row.ratio)
-                places += [self.place(group, first + a) for group in range(6)]
-                columns += (sp.Integer(LAWS[row.law]), sp.Integer(a), *_full(rows, row))
-                places += [self.behind(group, first + a) for group in range(2 + len(rows))]
         zeros = [e.xreplace(equations.at_node(i)) for i in range(equations.n) for e in time_gaps(equations.node_at(i))]
         zeros += [
             e.xreplace(equations.at_link(link, edge)) for link, edge in equations.linked() for e in time_gaps(edge)
         ]
         sides = jump_sides(zeros)
-        places += [Number(SIDES * self.rows + k) for k in range(len(sides))]
-        used, stores = self.stored("out", [*columns, *sides], places)
+        ends = [Number(SIDES * self.rows + k) for k in range(len(sides))]
+        if equations.joined:
+            used, stores = self.of_parts(sides, ends)
+        else:
+            columns, places = self.columns(self.groups())
+            used, stores = self.stored("out", [*columns, *sides], [*places, *ends])
         return [*self.loads(used, "p"), *parameter_loads(equations, used), *stores]
+
+    def columns(self, groups: Iterable[_Group]) -> tuple[list[sp.Expr], list[Expression]]:
+        """Return the numbers of the rows and their places in `out`."""
+        columns: list[sp.Expr] = []
+        places: list[Expression] = []
+        for group in groups:
+            for a, (number, row) in enumerate(group.numbers()):
+                mode = sp.S.One if row.law is Law.RESET else row.mode
+                columns += (row.level, row.gap, mode, row.speed, row.rate, row.ratio)
+                places += [self.place(k, number) for k in range(6)]
+                columns += (sp.Integer(LAWS[row.law]), sp.Integer(a), *_full(group.rows, row))
+                places += [self.behind(k, number) for k in range(2 + len(group.rows))]
+        return columns, places
+
+    def of_parts(self, sides: Sequence[sp.Expr], ends: Sequence[Expression]) -> tuple[set[sp.Symbol], list[Statement]]:
+        """Return the numbers of the rows of parts; parts of one shape have equal statements."""
+        used, statements = self.stored("out", sides, ends)
+        bodies: dict[tuple[Row, ...], StraightLine] = {}
+        supply = self.names.fresh("z")
+        for group in self.groups():
+            columns, places = self.columns([group])
+            moving = [k for k, e in enumerate(columns) if not e.is_number]
+            if group.rows not in bodies:
+                bodies[group.rows] = share([columns[k] for k in moving], supply)
+            named = {s: next(self.supply) for s in group.rates if s in bodies[group.rows].symbols}
+            body = bodies[group.rows].at({**group.values, **named})
+            rates = [group.rates[s] for s in named]
+            used |= (body.symbols - set(named.values())).union(*(e.free_symbols for e in rates))
+            statements += [let(s.name, lane(lower(e))) for s, e in zip(named.values(), rates, strict=True)]
+            statements += assigned(body)
+            results = dict(zip(moving, map(lower, body.results), strict=True))
+            statements += [
+                store("out", place, lane(results[k] if k in results else Number(float(e))))
+                for k, (place, e) in enumerate(zip(places, columns, strict=True))
+            ]
+        return used, statements
 
     def strike(self) -> list[Statement]:
         equations, columns, places, loads, modes = self.equations, [], [], [], []
-        for i, first, rows in self.parts():
-            symbols = equations.symbols(i)
+        slots = {name: k for k, name in enumerate(equations.state)}
+        for group in self.groups():
             numbers = []
-            for a in range(len(rows)):
+            for number, _ in group.numbers():
                 triple = tuple(islice(self.supply, 3))
                 numbers.append(triple)
                 loads += [
-                    let(s.name, Load("out", self.behind(2 + self.most + k, first + a))) for k, s in enumerate(triple)
+                    let(s.name, Load("out", self.behind(2 + self.most + k, number))) for k, s in enumerate(triple)
                 ]
-            size = len(equations.node_at(i).continuous)
-            after = struck(rows, symbols[:size], numbers)
-            columns += [e for e, s in zip(after, symbols, strict=False) if e != s]
-            places += [Number(k) for k, e, s in zip(equations.places[i], after, symbols, strict=False) if e != s]
-            held = [a for a, row in enumerate(rows) if row.law is not Law.RESET]
+            after = struck(group.rows, group.state, numbers)
+            columns += [e.xreplace(dict(group.values)) for e, s in zip(after, group.state, strict=True) if e != s]
+            places += [Number(k) for k, e, s in zip(group.places, after, group.state, strict=True) if e != s]
+            held = {number: row.mode for number, row in group.numbers() if row.law is not Law.RESET}
             modes += [
-                store("y", k, Load("out", self.place(MODE, first + a)))
-                for k, a in zip(equations.places[i][size:], held, strict=True)
+                store("y", slots[group.values.get(mode, mode).name], Load("out", self.place(MODE, number)))
+                for number, mode in held.items()
             ]
         used, stores = self.stored("y", columns, places)
         return [*self.loads(used, "y"), *parameter_loads(equations, used), *loads, *stores, *modes]
 
-    def parts(self) -> list[tuple[int, int, tuple[Row, ...]]]:
-        """Return each node with its first row and its rows."""
-        parts, first = [], 0
-        for i in by_kind(self.equations):
-            rows = self.equations.rows_at(i)
-            parts.append((i, first, rows))
+    def groups(self) -> list[_Group]:
+        """Return the rows that are solved together: of each node, or of each part that links join."""
+        equations, groups, first = self.equations, list[_Group](), 0
+        for part in equations.parts:
+            template = part.template
+            rates = equations.rates_of(part)
+            groups.append(_Group(first, template.rows, part.at, rates, template.state, part.places))
+            first += len(template.rows)
+        for i in () if equations.joined else by_kind(equations):
+            rows, size = equations.rows_at(i), len(equations.node_at(i).continuous)
+            groups.append(_Group(first, rows, {}, {}, equations.symbols(i)[:size], equations.places[i][:size]))
             first += len(rows)
-        return parts
+        return groups
 
     def loads(self, used: set[sp.Symbol], of_modes: str) -> list[Statement]:
         """Load states from `y`; modes, which last for a whole step, from `of_modes`."""

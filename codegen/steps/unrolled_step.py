@@ -12,17 +12,19 @@ operation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 
 import sympy as sp
 
 from synchain.models.dynamics.angles import periods_of_states
+from synchain.models.dynamics.parts import PartTemplate
 
 from ..program.expressions import ZERO, Expression, Load, Name, Number, ProductExpr, call, linear, plus
 from ..program.lowering import lower
-from ..program.passes import real
+from ..program.passes import Names, StraightLine, real, share
 from ..program.statements import If, Return, let, store
+from .blocks import assigned
 from .elimination import Entries, plan, times, write_factors, write_solve
 from .mass_solve import Mass
 from .step import NOW, StepWriter, entry, lane, linearised, prefix
@@ -30,6 +32,17 @@ from .step import NOW, StepWriter, entry, lane, linearised, prefix
 
 class UnrolledStep(StepWriter):
     """Write a step that holds each state of each vector in a register."""
+
+    @cached_property
+    def part_bodies(self) -> dict[PartTemplate, StraightLine]:
+        """What the rows of parts add to rates, by shape; filled where they are first written."""
+        return {}
+
+    @cached_property
+    def supply(self) -> Iterator[sp.Symbol]:
+        """Names for the values that several x share."""
+        eq = self.equations
+        return Names([*eq.state, *eq.parameters, *(s.name for s in self.of_nodes)]).fresh("row_")
 
     @cached_property
     def mass(self) -> Mass:
@@ -75,6 +88,24 @@ class UnrolledStep(StepWriter):
                     terms.setdefault(f"{prefix(out)}{s.name}_{link[0] + 1}", []).append(lower(term))
         for target, parts in terms.items():
             self.let(target, plus(Name(target), *parts))
+        self.rows(base, out, at)
+
+    def rows(self, base: str, out: str, at: Mapping[sp.Symbol, sp.Symbol]) -> None:
+        """Add the rates of the rows of parts that links join; parts of one shape have equal statements."""
+        for part in self.equations.parts:
+            template = part.template
+            if template not in self.part_bodies:
+                self.part_bodies[template] = share([e for e in template.added if e != 0], self.supply)
+            targets = [f"{prefix(out)}{self.state[k]}" for k in part.places]
+            states = {s: real(f"{prefix(base)}{e}") for s, e in part.at.items() if e.name in self.state}
+            rates = {s: real(target) for s, target in zip(template.rates, targets, strict=True) if s is not None}
+            body = self.part_bodies[template].at({**part.at, **states, **rates, **at})
+            self.put(*assigned(body))
+            pushed = (target for target, e in zip(targets, template.added, strict=True) if e != 0)
+            # all x are known before the first rate changes
+            self.put(*(let(f"added_{target}", lower(e)) for target, e in zip(pushed, body.results, strict=True)))
+            pushed = (target for target, e in zip(targets, template.added, strict=True) if e != 0)
+            self.put(*(let(target, plus(Name(target), Name(f"added_{target}"))) for target in pushed))
 
     # -- linearisation ----------------------------------------------------------------------------------------
 

@@ -16,6 +16,7 @@ import sympy as sp
 
 from synchain.models.dynamics.angles import periods_of_states
 from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.parts import Part
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.mechanics.events import Event
 from synchain.models.mechanics.rows import Row
@@ -173,10 +174,11 @@ class UnrolledSeries(TaylorStepWriter):
         self.graph, self.parts = self.lines.graph, [self.lines]
         # states that move are series; all other states, such as modes of contacts, are constants
         edges = [[edge for link, edge in equations.linked() if link[0] == i] for i in range(equations.n)]
-        moves = (compress(slots, moving(equations.node_at(i), edges[i])) for i, slots in enumerate(equations.places))
+        moves = [compress(slots, moving(equations.node_at(i), edges[i])) for i, slots in enumerate(equations.places)]
+        moves += [compress(part.places, (e != 0 for e in part.template.added)) for part in equations.parts]
         periods = periods_of_states(equations)
         self.moving = {
-            slot: State(name=self.names[slot], period=periods[slot]) for slot in sorted(chain.from_iterable(moves))
+            slot: State(name=self.names[slot], period=periods[slot]) for slot in sorted(set(chain.from_iterable(moves)))
         }
         still = {slot: Constant(Name(self.called[name])) for slot, name in enumerate(equations.state)}
         self.states: list[Series] = list((still | self.moving).values())
@@ -196,6 +198,13 @@ class UnrolledSeries(TaylorStepWriter):
             for slot, rate in zip(places[target], rates, strict=True):
                 terms[slot].append((ONE, rate))
         rates_of = {slot: self.graph.sum(terms[slot]) for slot in self.moving}
+        self.plain = dict(rates_of)
+        for part in self.equations.parts:
+            moving, constant = self.of_part(part)
+            added = Template.of(part.template.added, moving, self.supply.fresh("shared_"))
+            for slot, series in zip(part.places, self.graph.read(added, moving, constant), strict=True):
+                if slot in rates_of:
+                    rates_of[slot] = self.graph.sum([(ONE, self.plain[slot]), (ONE, series)])
         if self.equations.inertial:
             entries = defaultdict[tuple[int, int], list[tuple[Expression, Series]]](list)
             for ends, masses in self.contributions(_masses_of_node, _masses_of_link, {}):
@@ -225,16 +234,34 @@ class UnrolledSeries(TaylorStepWriter):
 
     def contacts(self) -> Iterator[Gaps]:
         """Yield the gaps of the contact of each node that has one."""
-        eq, shared = self.equations, self.supply.fresh("shared_")
-        moving, constant = self.of_network()
+        eq, network = self.equations, self.of_network()
         for i in range(eq.n):
             conditions: tuple[Event | Row, ...] = (*eq.events_at(i), *eq.rows_at(i))
             for k, condition in enumerate(conditions):
-                series = tuple(self.graph.read(Template.of(condition.gaps, moving, shared), moving, constant))
-                name = self.called.get(condition.mode.name, f"guard_{i}_{k}")
-                sizes = tuple(f"size_{name}_{way}" for way in ("rise", "fall")[: len(series)])
-                room = Number(self.lines.room + 2 * (self.order + 1))
-                yield Gaps(name, f"stuck_{name}", series, sizes, tuple(map(Name, sizes)), room, 1 + eq.has_rows)
+                yield self.gaps_of(condition, condition.mode.name, f"guard_{i}_{k}", network)
+        for number, part in enumerate(eq.parts):
+            symbols = self.of_part(part)
+            for k, row in enumerate(part.template.rows):
+                mode = part.at.get(row.mode, row.mode).name
+                yield self.gaps_of(row, mode, f"guard_{number}_{k}", symbols)
+
+    def gaps_of(self, condition: Event | Row, mode: str, guard: str, symbols: Symbols) -> Gaps:
+        """Return the gaps of a contact or row; a reset has no mode and is called `guard`."""
+        moving, constant = symbols
+        template = Template.of(condition.gaps, moving, self.supply.fresh("shared_"))
+        series = tuple(self.graph.read(template, moving, constant))
+        name = self.called.get(mode, guard)
+        sizes = tuple(f"size_{name}_{way}" for way in ("rise", "fall")[: len(series)])
+        room = Number(self.lines.room + 2 * (self.order + 1))
+        rounds = 1 + self.equations.has_rows
+        return Gaps(name, f"stuck_{name}", series, sizes, tuple(map(Name, sizes)), room, rounds)
+
+    def of_part(self, part: Part) -> Symbols:
+        """Return the series, or the constants, for the symbols of the template of a part."""
+        moving, constant = self.symbols({TIME: self.time}, part.at)
+        rates = zip(part.template.rates, part.places, strict=True)
+        still = Constant(ZERO)
+        return moving | {s: self.plain.get(slot, still) for s, slot in rates if s is not None}, constant
 
     def of_network(self) -> Symbols:
         """Return the series, or the constants, for the symbols of the whole network."""

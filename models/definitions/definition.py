@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from ..inputs.plugins import PluginKind
+from ..mechanics.law_plugins import FRICTION_LAW
+
+__all__ = ["COUPLING", "FRICTION_LAW", "OSCILLATOR"]
 
 
 def _oscillators() -> tuple[type, ...]:
     from ..mechanics.oscillator import Oscillator
 
     return (Oscillator,)
-
-
-def _laws() -> tuple[type, ...]:
-    from ..mechanics.contact import FrictionLaw
-
-    return (FrictionLaw,)
 
 
 def _couplings() -> tuple[type, ...]:
@@ -31,15 +28,6 @@ OSCILLATOR = PluginKind(
     near={"roessler": "rossler", "vdp": "van_der_pol"},
 )
 """Oscillators: the files of the folder `oscillators`."""
-
-FRICTION_LAW = PluginKind(
-    "friction",
-    "frictions",
-    _laws,
-    "friction_law(…)",
-    otherwise=", or an expression, friction_law('mu*sign(w)', {'mu': 0.3})",
-)
-"""Friction laws: the files of the folder `frictions`."""
 
 COUPLING = PluginKind(
     "coupling",

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from ..inputs.plugins import load
 from ..interactions.coupling import Coupling, LagrangianCoupling, MatrixCoupling, split
-from ..mechanics.contact import FrictionLaw
+from ..mechanics.law_plugins import load_friction_law
 from ..mechanics.oscillator import Oscillator
-from .definition import COUPLING, FRICTION_LAW, OSCILLATOR
+from .definition import COUPLING, OSCILLATOR
 
 __all__ = ["load_friction_law", "load_oscillator", "read_coupling"]
 
@@ -30,12 +30,6 @@ def load_oscillator(name: str) -> Oscillator:
     """
     oscillator: Oscillator = load(OSCILLATOR, name)
     return oscillator
-
-
-def load_friction_law(name: str) -> FrictionLaw:
-    """Return the friction law of a plug-in."""
-    law: FrictionLaw = load(FRICTION_LAW, name)
-    return law
 
 
 def read_coupling(text: str) -> Coupling:

@@ -10,7 +10,7 @@ from typing import Any
 import sympy as sp
 
 from ..inputs.checks import check_keys, check_table, check_text, short_repr, typed_repr
-from ..interactions.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling, from_table
+from ..interactions.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling, Potential, from_table
 from ..mechanics.components import TIME
 from ..mechanics.contact import SLIDING, ContactModel, FrictionLaw
 from ..mechanics.expression import read, written
@@ -44,7 +44,7 @@ def oscillator_of_table(table: Mapping[object, Any]) -> Oscillator:
     first_order = "rates" in table
     check_keys("oscillator", table, _FIELD if first_order else _LAGRANGIAN)
     keywords = {str(key): value for key, value in table.items()}
-    keywords["events"] = _events(keywords.get("events", []))
+    keywords["events"] = _events("oscillator", keywords.get("events", []))
     if first_order:
         return Field(_texts("oscillator: rates", keywords.pop("rates")), **keywords)
     for key in ("coordinates", "kinetic"):
@@ -82,7 +82,7 @@ def law_of_table(table: Mapping[object, Any]) -> FrictionLaw:
 def coupling_of_table(table: Mapping[object, Any]) -> Coupling:
     """Make a coupling from a table of a scene file: energies of coordinates, or rates or a potential of states."""
     if "energies" not in table:
-        return from_table("coupling", table)
+        return from_table("coupling", table, _events("coupling", table.get("events", [])))
     check_keys("coupling", table, _LINK)
     keywords = {str(key): value for key, value in table.items()}
     on = keywords.pop("on", None)
@@ -109,13 +109,13 @@ def _law(value: object) -> FrictionLaw | None:
     return None if name == "none" else load_friction_law(name)
 
 
-def _events(value: object) -> list[EventDefinition]:
+def _events(owner: str, value: object) -> list[EventDefinition]:
     """Make events from their tables."""
     if not isinstance(value, list | tuple):
-        raise TypeError(f"oscillator: events: found {typed_repr(value)}; expected a list of tables")
+        raise TypeError(f"{owner}: events: found {typed_repr(value)}; expected a list of tables")
     found: list[EventDefinition] = []
     for k, entry in enumerate(value):
-        what = f"oscillator: events[{k + 1}]"
+        what = f"{owner}: events[{k + 1}]"
         event = check_table(what, entry)
         kind = next((word for word in _EVENTS if word in event), None)
         if kind is None:
@@ -166,6 +166,8 @@ def as_text_or_table(coupling: Coupling | None) -> str | dict[str, Any]:
     """Return the text of a coupling made from components or by a plug-in, else its table; "none" for None."""
     if coupling is None or isinstance(coupling, MatrixCoupling):
         return "none" if coupling is None else str(coupling)
+    if isinstance(coupling, Potential) and coupling.events:
+        return {**coupling.as_dict(), "events": [_event_table(event, coupling) for event in coupling.events]}
     if not isinstance(coupling, LagrangianCoupling):
         return coupling.as_dict()
     if coupling.name.endswith(".py"):
@@ -198,7 +200,7 @@ def _oscillator_table(node: Oscillator) -> dict[str, Any]:
     return table
 
 
-def _event_table(event: EventDefinition, texts: _Texts) -> dict[str, Any]:
+def _event_table(event: EventDefinition, texts: _Texts | Potential) -> dict[str, Any]:
     if isinstance(event, Friction):
         law = {} if not isinstance(event.law, FrictionLaw) else {"law": as_name_or_table(event.law)}
         return {"friction": texts.write(event.sliding), "load": texts.write(event.load), **law}

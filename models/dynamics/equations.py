@@ -19,10 +19,13 @@ import sympy as sp
 from ..graphs.links import AllPairs, Link, Links
 from ..inputs.display import HasLatex
 from ..inputs.names import LinkName
+from ..interactions.ends import has_velocities
 from ..interactions.separation import separated
-from ..mechanics.components import Block, Edge, Node
+from ..mechanics.calculus import derivative
+from ..mechanics.components import TIME, Block, Edge, Node
 from ..mechanics.events import Event
 from ..mechanics.rows import Row
+from .parts import Part, PartLink, local, of_link, part_template
 
 Ends = tuple[int, int]
 """The kinds of a link's target and source."""
@@ -37,6 +40,10 @@ DIGEST_LIMIT = 10_000
 
 Up to this number a complete graph and a list of the same links have equal digests.
 """
+
+
+MOST_JOINED_NODES = 16
+"""Most nodes of a network with rows in links (a choice): its steps are written out, and longer ones compile slowly."""
 
 
 class _Cached:
@@ -54,6 +61,8 @@ class Layer:
     varied: tuple[str, ...] = ()  # parameters with a value for each link: k_1_2 for the link from node 2 to node 1
     mutual: bool = False  # True if the links i -> j and j -> i share the values of `varied`
     beyond: tuple[int, ...] = ()  # the second source (0-based) of each link of three ends; empty for links of two ends
+    # The links with rows, one direction of each, and the places of the modes of these rows in `Node.joined` of the source.
+    held: tuple[tuple[Link, tuple[int, ...]], ...] = ()
 
     def each(self) -> Iterator[Link | Triad]:
         """Yield each link; the second source of a link of three ends follows the weight."""
@@ -170,6 +179,11 @@ class Equations(_Cached, HasLatex):
     def edges(self) -> tuple[Edge, ...]:
         """The templates that links use."""
         return tuple(edge for _, edge in self.edge_of)
+
+    @property
+    def templates(self) -> tuple[Node | Edge, ...]:
+        """The templates of nodes and of links."""
+        return *self.nodes, *self.edges
 
     def linked(self) -> Iterator[tuple[Link | Triad, Edge]]:
         """Yield each link with its template, layer by layer."""
@@ -294,7 +308,12 @@ class Equations(_Cached, HasLatex):
     @property
     def has_rows(self) -> bool:
         """True if events are rows (`synchain.models.mechanics.rows`)."""
-        return any(node.rows for node in self.nodes)
+        return self.joined or any(node.rows for node in self.nodes)
+
+    @property
+    def joined(self) -> bool:
+        """True if links have rows, so that rows of several nodes are solved together."""
+        return any(node.joined or node.surfaces for node in self.nodes)
 
     @property
     def modes(self) -> frozenset[str]:
@@ -426,13 +445,71 @@ class Equations(_Cached, HasLatex):
                 added = [a + e for a, e in zip(added, rates, strict=True)]
         return tuple(row.map(lambda e: e.xreplace(at_node)).under(added) for row in node.rows)
 
-    def rhs(self) -> tuple[sp.Expr, ...]:
-        """Return the right-hand side in state order; meant for small n, since the algebra grows with n."""
+    @cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """The parts of a network with rows in links (`synchain.models.dynamics.parts`), in the order of their first nodes."""
+        if not self.joined:
+            return ()
+        part_of = list(range(self.n))
+        links = [(layer, link, modes) for layer in self.layers for link, modes in layer.held]
+        for _, (i, j, _), _ in links:
+            merged = part_of[j]
+            part_of = [part_of[i] if k == merged else k for k in part_of]
+        parts = []
+        for number in dict.fromkeys(part_of):
+            nodes = tuple(i for i in range(self.n) if part_of[i] == number)
+            inside = [each for each in links if each[1][0] in nodes]
+            at: dict[sp.Symbol, sp.Symbol] = {}
+            for m, i in enumerate(nodes):
+                at |= {local(s, m): e for s, e in self.at_node(i).items()}
+            shape = []
+            for k, (layer, link, modes) in enumerate(inside):
+                target, source, weight = link
+                edge = dict(layer.edge_of)[self.ends(link)]
+                shape.append(PartLink(edge, nodes.index(target), nodes.index(source), weight, modes, layer.varied))
+                names = (layer.name(name, link) for name in layer.varied)
+                at |= {
+                    of_link(name, k): sp.Symbol(own, real=True) for name, own in zip(layer.varied, names, strict=True)
+                }
+            template = part_template(tuple(map(self.node_at, nodes)), tuple(shape), self.varied)
+            if template.rows:
+                places = (k for i in nodes for k in self.places[i][: len(self.node_at(i).continuous)])
+                parts.append(Part(nodes, template, at, tuple(places)))
+        return tuple(parts)
+
+    def rows_of(self, part: Part) -> tuple[Row, ...]:
+        """Return the rows of a part in the symbols of the network."""
+        values: dict[sp.Symbol, sp.Expr] = {**part.at, **self.rates_of(part)}
+        return tuple(row.map(lambda e: e.xreplace(values)) for row in part.template.rows)
+
+    def rates_of(self, part: Part) -> dict[sp.Symbol, sp.Expr]:
+        """Return the rate without rows for each symbol of a rate in the template of a part."""
+        pairs = zip(part.template.rates, part.places, strict=True)
+        return {s: self._plain_rhs[k] for s, k in pairs if s is not None}
+
+    def added_rates(self) -> Iterator[tuple[int, sp.Expr]]:
+        """Yield (row, rate) for each rate that the rows of a part add."""
+        for part in self.parts:
+            values: dict[sp.Symbol, sp.Expr] = {**part.at, **self.rates_of(part)}
+            yield from (
+                (k, e.xreplace(values)) for k, e in zip(part.places, part.template.added, strict=True) if e != 0
+            )
+
+    @cached_property
+    def _plain_rhs(self) -> list[sp.Expr]:
+        """The right-hand side without the rows of parts."""
         rates = self._of_nodes([node.rhs for node in self.nodes])
         for link, edge in self.linked():
             values = self.at_link(link, edge)
             for k, e in zip(self.places[link[0]], edge.rhs, strict=True):
                 rates[k] += e.xreplace(values)
+        return rates
+
+    def rhs(self) -> tuple[sp.Expr, ...]:
+        """Return the right-hand side in state order; meant for small n, since the algebra grows with n."""
+        rates = [*self._plain_rhs]
+        for k, e in self.added_rates():
+            rates[k] += e
         return tuple(rates)
 
     def _of_nodes(self, by_kind: list[tuple[sp.Expr, ...]]) -> list[sp.Expr]:
@@ -481,6 +558,10 @@ class Equations(_Cached, HasLatex):
             yield from _block(there, places[link[0]], places[link[1]], values)
             for k in link[3:]:
                 yield from _block(beyond, places[link[0]], places[k], values)
+        states = {sp.Symbol(name, real=True): k for k, name in enumerate(self.state)}
+        for row, e in self.added_rates():
+            moving = sorted(e.free_symbols & set(states), key=states.__getitem__)
+            yield from (((row, states[s]), derivative(e, s)) for s in moving)
 
     def time_derivative(self) -> tuple[sp.Expr, ...]:
         """Return the partial derivative of the right-hand side with respect to time, in state order."""
@@ -496,6 +577,7 @@ class Equations(_Cached, HasLatex):
             for k, e in zip(self.places[link[0]], slopes.get(edge, ()), strict=False):
                 if e != 0:
                     yield k, e.xreplace(self.at_link(link, edge))
+        yield from ((k, derivative(e, TIME)) for k, e in self.added_rates() if e.has(TIME))
 
     @cached_property
     def digest(self) -> str:
@@ -507,6 +589,9 @@ class Equations(_Cached, HasLatex):
         parts = [_text(first.state, first.rhs, first.parameters), str(self.n), links]
         parts += ["; ".join(map(sp.srepr, event.expressions)) for event in first.events]
         parts += [f"{row.law} {'; '.join(map(sp.srepr, row.expressions))}" for node in self.nodes for row in node.rows]
+        surfaces = [s for template in self.templates for s in template.surfaces]
+        parts += [f"{s.law} {'; '.join(map(sp.srepr, s.expressions))}" for s in surfaces]
+        parts += [f"rows in links {[layer.held for layer in self.layers]}"] if self.joined else []
         parts += [sp.srepr(sp.Matrix(node.inertia)) for node in self.nodes if node.inertia]
         parts += [f"varied {' '.join(self.varied)}"] if self.varied else []
         if others:  # several kinds of nodes
@@ -570,6 +655,8 @@ def check(eq: Equations) -> None:
         raise ValueError(f"kinds of nodes: found {len(eq.nodes)} templates and the kinds {sorted(set(eq.kind_of))}")
     if eq.sticks:
         _check_friction(eq)
+    if eq.joined:
+        _check_joined(eq)
     _check_links(eq)
     _check_numbered(eq)
 
@@ -598,6 +685,21 @@ def _check_friction(eq: Equations) -> None:
         raise ValueError(
             f"links with set-valued friction: found {found}; expected one layer of links of the states; use contact 'atan'"
         )
+
+
+def _check_joined(eq: Equations) -> None:
+    """Raise ValueError for networks in which rows in links are not supported."""
+    if eq.n > MOST_JOINED_NODES:
+        raise ValueError(
+            f"rows in links: found {eq.n} nodes; expected at most {MOST_JOINED_NODES}, whose steps are written out"
+        )
+    for (target, _), edge in eq.edge_of:
+        node = eq.nodes[target]
+        half = len(node.continuous) // 2
+        if has_velocities(node) and any(e != 0 for e in edge.rhs[:half]):
+            raise ValueError(
+                f"rows in links: found a link that changes the rate of {node.state[0]}; expected forces, which change velocities"
+            )
 
 
 def _check_links(eq: Equations) -> None:

@@ -167,7 +167,8 @@ def derivative(equations: Equations, name: str) -> Equations:
 
 def _check(equations: Equations) -> None:
     """Raise ValueError for rates that jump, whose derivatives do not describe small deviations."""
-    if laws := {row.law for node in equations.nodes for row in node.rows}:
+    surfaces = (s for template in equations.templates for s in template.surfaces)
+    if laws := {row.law for node in equations.nodes for row in node.rows} | {s.law for s in surfaces}:
         events = " and ".join({Law.SIGN: "set-valued signs"}.get(law, f"{law}s") for law in Law if law in laws)
         raise ValueError(
             f"derivative of a network: found {events}; expected smooth rates; use steep rates in their place"

@@ -6,6 +6,7 @@ equations of a node are therefore those of the single oscillator plus one force 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -30,7 +31,7 @@ from ..mechanics.lagrangian import LARGEST_BY_MINORS, check_masses_exist, couple
 from ..mechanics.nondimensional import friction_coefficient, nondimensional, scale, static_coefficient
 from ..mechanics.oscillator import FRICTION, FieldModel, LagrangianModel, Oscillator
 from ..mechanics.parameter import Parameter
-from ..mechanics.rows import Law, Surface, friction_surface, with_rows
+from ..mechanics.rows import Law, Surface, check_surfaces, friction_surface, modes_of, with_rows
 from ..mechanics.sliding import sliding_surfaces
 from .equations import Equations, Layer
 
@@ -62,8 +63,16 @@ def parameters(
     ):
         _join(table, {"kappa": KAPPA}, f"contact {str(contact)!r}")
     for coupling in couplings:
-        _join(table, coupling.parameters, f"coupling {str(coupling)!r}", _free_spelling(coupling, oscillator))
+        # contacts of nodes and links with one law share its parameters
+        shared = {name for law in _laws_of(coupling) if law in laws for name in law.parameters}
+        more = {name: p for name, p in coupling.parameters.items() if name not in shared}
+        _join(table, more, f"coupling {str(coupling)!r}", _free_spelling(coupling, oscillator))
+        laws += _laws_of(coupling)
     return {name: replace(p, scale=str(scale(oscillator, p.unit))) for name, p in table.items()}
+
+
+def _laws_of(coupling: Coupling) -> tuple[FrictionLaw, ...]:
+    return coupling.laws if isinstance(coupling, Potential) else ()
 
 
 @lru_cache(maxsize=64)
@@ -72,10 +81,12 @@ def node(
     friction: FrictionLaw | None = None,
     contact: str = ContactModel.ATAN,
     rows: bool = False,
+    of_links: tuple[str, ...] | None = None,
 ) -> Node:
     """Derive the equations of one oscillator; for a Lagrangian, x' = v and the Euler-Lagrange equations for v'.
 
     rows: write friction of one coordinate on a steady ground as a row too, as networks of several kinds need it.
+    of_links: names of the modes of rows of links, in a network that has any; rows are then solved by `Equations.parts`.
 
     Raises ValueError as `parameters` does.
     """
@@ -87,7 +98,7 @@ def node(
         if contact == ContactModel.SET_VALUED and oscillator.has_contact:
             rates, signs = sliding_surfaces(state, rates)
             surfaces = [*signs, *surfaces]
-        return _with_surfaces(state, rates, surfaces, {}, symbols)
+        return _with_surfaces(state, rates, surfaces, {}, symbols, of_links)
 
     # Solve M dv/dt = r in symbols. With too many coupled coordinates keep M, with identity rows for the coordinates.
     system = nondimensional(oscillator)
@@ -111,7 +122,7 @@ def node(
         for e in accelerations
     ]
     stops = [event for event in events if isinstance(event, Stop)]
-    plain = not rows and not events and on_steady_ground(smooth, FRICTION, positions, velocities)
+    plain = not rows and of_links is None and not events and on_steady_ground(smooth, FRICTION, positions, velocities)
     if sticking and friction is not None and plain:
         (x,), (v,) = positions, velocities
         w = sp.Dummy("w", real=True)
@@ -129,7 +140,7 @@ def node(
         push = solve_masses(masses, [derivative(stop.gap, x) for x in positions], velocities)
         surfaces.append(Surface(Law.STOP, stop.gap, (*zeros, *push), stop.restitution))
     surfaces += _resets(events)
-    node = _with_surfaces((*positions, *velocities), (*velocities, *smooth), surfaces, speeds, symbols)
+    node = _with_surfaces((*positions, *velocities), (*velocities, *smooth), surfaces, speeds, symbols, of_links)
     return replace(node, law=law, inertia=inertia)
 
 
@@ -151,8 +162,18 @@ def _with_surfaces(
     surfaces: Sequence[Surface],
     speeds: Mapping[sp.Symbol, sp.Symbol],
     parameters: tuple[sp.Symbol, ...],
+    of_links: tuple[str, ...] | None,
 ) -> Node:
     """Return a node of these states and rates, with rows if there are surfaces."""
+    if of_links is not None:
+        check_surfaces(surfaces)
+        modes = modes_of(surfaces)
+        held = iter(modes)
+        placed = [surface if surface.law is Law.RESET else surface.in_mode(next(held)) for surface in surfaces]
+        joined = (*modes, *(sp.Symbol(name, real=True) for name in of_links))
+        return Node(
+            (*state, *joined), (*rates, *[sp.S.Zero] * len(joined)), parameters, surfaces=tuple(placed), joined=joined
+        )
     if not surfaces:
         return Node(state, rates, parameters)
     states, rhs, rows = with_rows(state, rates, surfaces, speeds)
@@ -257,7 +278,7 @@ def _layer(
     if numbered:
         return _listed_layer((((0, 0), shared),), graph, numbered, mutual)
     # A complete graph of one weight becomes a mean field if the link separates, else a list, if not too long.
-    weight = None if graph.n <= FEW or apart.sticks else graph.all_to_all
+    weight = None if graph.n <= FEW or apart.sticks or link.surfaces else graph.all_to_all
     if weight is not None and separated(shared, apart.varied) is not None:
         return Layer((((0, 0), shared),), AllPairs(graph.n, weight))
     if weight is not None and graph.link_count > LINK_LIMIT:
@@ -321,7 +342,87 @@ def layered_network(
             linked.append(_mixed_layer(apart, oscillators, coupling, graph, numbered, mutual))
         else:
             linked.append(_layer(apart, edge(coupling, singles[0], oscillators[0]), graph, numbered, mutual))
+    if any(_has_rows(coupling) for coupling, _ in layers):
+        linked = _with_held(apart, layers, linked)
     return replace(apart, layers=tuple(linked)) if linked else apart
+
+
+def _has_rows(coupling: Coupling) -> bool:
+    return isinstance(coupling, Potential) and bool(coupling.events)
+
+
+def modes_of_links(layers: Layers, kinds: Sequence[int]) -> tuple[tuple[str, ...], ...] | None:
+    """Return the names of the modes of links at each kind of node; None if no link has rows.
+
+    The source of a link has the modes of its rows.  All nodes of a kind have as many modes as the node with most; a mode
+    without a link stays 1.
+    """
+    if not any(_has_rows(coupling) for coupling, _ in layers):
+        return None
+    most = _most_of_links(layers, kinds)
+    names: list[list[str]] = [[] for _ in range(max(kinds) + 1)]
+    for (_, stem, _), counts in most.items():
+        for kind, count in enumerate(counts):
+            names[kind] += [stem] * count
+    return tuple(
+        tuple(s if of_kind.count(s) == 1 else f"{s}{of_kind[: k + 1].count(s)}" for k, s in enumerate(of_kind))
+        for of_kind in names
+    )
+
+
+def _most_of_links(layers: Layers, kinds: Sequence[int]) -> dict[tuple[int, str, int], list[int]]:
+    """Return, for each event of each layer, the largest number of its rows at a node of each kind."""
+    most = {}
+    for number, (coupling, graph) in enumerate(layers):
+        if not (isinstance(coupling, Potential) and coupling.events):
+            continue
+        sources = Counter(source for _, source, _ in _links_with_rows(coupling, graph, len(set(kinds)) > 1))
+        counts = [max(sources[i] for i, k in enumerate(kinds) if k == kind) for kind in range(max(kinds) + 1)]
+        for a, event in enumerate(coupling.events):
+            most[number, "open_link" if isinstance(event, Stop) else "slip_link", a] = counts
+    return most
+
+
+def _links_with_rows(coupling: Potential, graph: Topology, mixed: bool) -> list[Link]:
+    """Return one direction of each link of a graph; W = 1, from the target to the source, if the coupling has a direction."""
+    if isinstance(graph, Hypergraph) or graph.asymmetry:
+        found = "a hypergraph" if isinstance(graph, Hypergraph) else graph.asymmetry
+        raise ValueError(
+            f"coupling '{coupling}': found {found} in {graph.name}({graph.n}); contacts and stops act on both ends of a link; "
+            "expected links of equal weights both ways"
+        )
+    if coupling.oriented and not mixed:
+        return [link for link in oriented_links(graph) if link[2] == 1]
+    return [link for link in graph.links if link[0] < link[1]]
+
+
+def _with_held(apart: Equations, layers: Layers, linked: Sequence[Layer]) -> list[Layer]:
+    """Return the layers with the links whose rows can be held, and the places of their modes."""
+    most = _most_of_links(layers, apart.kind_of)
+    # the modes of links follow those of the rows of the node, event after event
+    firsts: dict[tuple[int, int, int], int] = {}
+    for kind, node in enumerate(apart.nodes):
+        place = len(node.joined) - sum(counts[kind] for counts in most.values())
+        for (number, _, a), counts in most.items():
+            firsts[number, a, kind] = place
+            place += counts[kind]
+    held_layers = []
+    for number, ((coupling, graph), layer) in enumerate(zip(layers, linked, strict=True)):
+        held, used = [], Counter[int]()
+        if isinstance(coupling, Potential) and coupling.events:
+            differing = sorted({name for law in coupling.laws for name in law.parameters} & set(apart.varied))
+            if differing:
+                raise ValueError(
+                    f"coupling '{coupling}': found {differing[0]!r} of its contact, which differs from node to node; expected one "
+                    "value; give the contact a law with another parameter"
+                )
+            for link in _links_with_rows(coupling, graph, apart.mixed):
+                source = link[1]
+                kind = apart.kind_of[source]
+                held.append((link, tuple(firsts[number, a, kind] + used[source] for a in range(len(coupling.events)))))
+                used[source] += 1
+        held_layers.append(replace(layer, held=tuple(held)))
+    return held_layers
 
 
 def _mixed_layer(

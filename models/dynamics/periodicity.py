@@ -85,7 +85,7 @@ def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Dr
     """Return the waves of a driven network and the largest frequency that divides all of them."""
     # Collect the frequencies of the unchanged rates. Time must occur only in sines and cosines.
     frequencies: set[sp.Expr] = set()
-    without = [_without_waves(e, _local(template), frequencies) for template in templates for e in template.rhs]
+    without = [_without_waves(e, _local(template), frequencies) for template in templates for e in template.driven]
     waves = tuple(sorted(frequencies, key=sp.default_sort_key))
     if any(e.has(TIME) for e in without):
         return Drive(waves, problem="depends on time other than by sines and cosines of a t + b, a constant")
@@ -95,7 +95,7 @@ def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Dr
         return Drive(waves, problem=problem)
 
     # Write products and powers as sums of waves: cos(w t)**2 has only the frequency 2 w.
-    rates = [(_sum_of_waves(e), _local(template)) for template in templates for e in template.rhs if e.has(TIME)]
+    rates = [(_sum_of_waves(e), _local(template)) for template in templates for e in template.driven if e.has(TIME)]
     summed: set[sp.Expr] = set()
     for e, states in rates:
         _without_waves(e, states, summed)
@@ -195,7 +195,7 @@ def _bends(templates: tuple[Node | Edge, ...]) -> set[sp.Expr]:
     bends: set[sp.Expr] = set()
     for template in templates:
         states = _local(template)
-        for e in template.rhs:
+        for e in template.driven:
             for part in e.atoms(sp.Function, sp.Max, sp.Min, sp.Pow, Relational):
                 for inner, power in _bent(part):
                     if inner.has(TIME) and not inner.free_symbols & states:
@@ -216,7 +216,7 @@ def _bent(part: sp.Basic) -> Iterator[tuple[sp.Expr, int]]:
 
 def gaps(template: Node | Edge) -> set[sp.Expr]:
     """Return expressions of time that pass zero where the rates of a template jump or have a kink."""
-    parts = {part for e in template.rhs for part in e.atoms(*KINKED, *JUMPING, Relational)}
+    parts = {part for e in template.driven for part in e.atoms(*KINKED, *JUMPING, Relational)}
     return _of_time(template, (gap for part in parts for gap in gaps_of(part)))
 
 
@@ -226,7 +226,7 @@ def rises(template: Node | Edge) -> set[sp.Expr]:
     A part that rises and falls again near one time, such as tanh**2, tanh tanh or exp(-|t|), gives two expressions.
     """
     rising: set[sp.Expr] = set()
-    for e in template.rhs:
+    for e in template.driven:
         bases = [p.base for p in e.atoms(sp.Pow) if p.exp.is_number and p.exp > 1]
         for part in e.atoms(*RISING):
             zeros = set(_risen(part))

@@ -96,8 +96,9 @@ def quotient(equations: Equations, colours: Sequence[Hashable]) -> tuple[Equatio
     """Return the smallest network with the same motion if nodes of equal colour start equal, and each node's class."""
     if any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
         raise NoQuotient(f"quotient: the {equations.link_count} links of all pairs are too many to be listed")
-    if equations.triadic:
-        raise NoQuotient("quotient: nodes with links of three ends are stepped one by one")
+    if equations.triadic or equations.joined:
+        found = "links of three ends" if equations.triadic else "rows in links"
+        raise NoQuotient(f"quotient: nodes with {found} are stepped one by one")
     classes = balanced_in_all(equations.n, [layer.links for layer in equations.layers], colours)
     if max(classes) + 1 == equations.n:
         return equations, classes

@@ -10,6 +10,7 @@ import sympy as sp
 
 from ..graphs.links import AllPairs
 from ..mechanics.components import Edge, Node
+from ..mechanics.rows import Law
 from .equations import Equations, Layer
 
 
@@ -23,6 +24,7 @@ def synchronous_node(equations: Equations) -> Node:
     Links that vanish between equal states add nothing.  Other links add k h(s, s), where k is the sum of the weights at
     a node; k must be equal for all nodes.
     """
+    expect_no_friction_in_links("complete synchronisation", equations)
     equations = equations.projected
     apart = replace(equations, layers=())
     apart.expect_alike("complete synchronisation")
@@ -34,11 +36,27 @@ def synchronous_node(equations: Equations) -> Node:
     return node
 
 
+def expect_no_friction_in_links(what: str, equations: Equations) -> None:
+    """Raise ValueError for contacts in links, which hold equal oscillators together, and for stops in links."""
+    laws = {surface.law for edge in equations.edges for surface in edge.surfaces}
+    if Law.SIGN in laws:
+        raise ValueError(
+            f"{what}: friction in links holds equal oscillators together: differences below the load/stiffness stay; expected "
+            "links without friction; compare runs instead"
+        )
+    if equations.joined:
+        raise ValueError(
+            f"{what}: found stops in links, whose gaps between equal oscillators are not known to stay open; expected links "
+            "without stops; compare runs instead"
+        )
+
+
 def expect_vanishing(what: str, equations: Equations) -> None:
     """Raise ValueError if a link acts between equal states, is not proportional to its weight, or has own parameters.
 
     Otherwise the synchronous motion is the same for all strengths, and deviations split into modes of the graph.
     """
+    expect_no_friction_in_links(what, equations)
     equations.expect_exact_links(what)
     equations = equations.projected
     if not all(edge.diffusive for edge in equations.edges):

@@ -24,7 +24,7 @@ from .equations import Equations
 from .mode_inertia import effective_slope
 from .reduction import by_class, collapse
 from .saltation import Entry, Events, of_mode, of_network, of_slots
-from .synchrony import synchronous_node
+from .synchrony import expect_no_friction_in_links, synchronous_node
 
 if TYPE_CHECKING:
     from ..symmetries.blocks import Exact
@@ -211,6 +211,7 @@ def clustered(equations: Equations, clusters: Clusters) -> ClusterVariation:
     Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014); several layers and links that act between
     equal states: Zhang & Motter, SIAM Rev. 62, 817 (2020).
     """
+    expect_no_friction_in_links("cluster states", equations)
     if max(clusters.classes) > 0:
         equations.expect_pairs("cluster states of several clusters")
     equations = equations.projected

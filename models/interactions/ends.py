@@ -9,6 +9,7 @@ import sympy as sp
 
 from ..inputs.checks import check_instance, suggestion
 from ..mechanics.components import TIME, Node
+from ..mechanics.impacts import Friction, Stop
 from ..mechanics.oscillator import Oscillator
 
 WEIGHT = sp.Symbol("weight", real=True)
@@ -99,7 +100,7 @@ def ends(node: Oscillator, source: Oscillator | Literal[2, 3] | None = None) -> 
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """The terms of one link: energies in the symbols of both ends, or rates of the states of the target.
+    """The terms of one link: energies and events in the symbols of both ends, or rates of the states of the target.
 
     `oriented` is True if the energy changes when the ends are exchanged (`synchain.models.interactions.link`).
     """
@@ -109,6 +110,7 @@ class Terms:
     dissipation: sp.Expr = sp.S.Zero
     rates: tuple[sp.Expr, ...] = ()
     oriented: bool = False
+    events: tuple[Friction | Stop, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

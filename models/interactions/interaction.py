@@ -6,13 +6,14 @@ Expressions contain the symbols of `ends`: x_i is the state or parameter x of th
 from __future__ import annotations
 
 import keyword
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from ..inputs.checks import (
+    check_instance,
     check_number,
     check_table,
     check_text,
@@ -23,7 +24,10 @@ from ..inputs.checks import (
 from ..inputs.expression_text import FUNCTIONS
 from ..inputs.frozen import FrozenDict
 from ..mechanics.components import TIME, Node
+from ..mechanics.contact import FrictionLaw
 from ..mechanics.expression import FRICTION_NAME, LENGTH, exact, read, written
+from ..mechanics.impacts import EventDefinition, Friction, Stop
+from ..mechanics.law_plugins import load_friction_law
 from ..mechanics.parameter import Parameter
 from .ends import WEIGHT, Pair, Terms, directed, has_velocities
 
@@ -157,12 +161,15 @@ class Potential:
         "k*W*(x_i - x_j)**2/2".
     parameters : mapping of Symbol or str to number or Parameter
         Parameters of the link with their defaults.
+    events : iterable of Friction or Stop, optional
+        Contacts and stops between the two ends; the energy may then be 0.  A contact has a law, whose parameters belong to
+        the link.  It is set-valued, whatever `contact` the scene has.
 
     Raises
     ------
     ValueError, TypeError
-        For a symbol that is not declared, a parameter or weight that the energy does not contain, an energy of only one
-        end, and a value that is no expression.
+        For a symbol that is not declared, a parameter or weight that the energy does not contain, an energy or event of only
+        one end, and a value that is no expression.
 
     See Also
     --------
@@ -179,32 +186,79 @@ class Potential:
     >>> print(sc.export.text(sc.Scene("harmonic", spring, sc.graphs.chain(2)).equations))
     x_1'' = -x_1 + x_2 - x_1
     x_2'' = -x_2 + x_1 - x_2
+
+    Balls that hit their neighbours:
+
+    >>> stop = sc.Potential(0, {"e": 0.9}, events=[sc.Stop(j.x - i.x, restitution="e")])
+    >>> stop.events
+    (Stop(gap=-x_i + x_j, restitution=e),)
     """
 
     energy: sp.Expr
     parameters: FrozenDict[Parameter]
+    events: tuple[Friction | Stop, ...]
 
-    def __init__(self, energy: object, parameters: Mapping[sp.Symbol | str, object] | None = None) -> None:
+    def __init__(
+        self,
+        energy: object,
+        parameters: Mapping[sp.Symbol | str, object] | None = None,
+        events: Iterable[EventDefinition] = (),
+    ) -> None:
         what = "potential of a link"
-        (e,), defaults = _checked(what, [_parsed(what, energy)], parameters, ("_i", "_j", "_k"))
+        listed = [_event(k, event) for k, event in enumerate(events, start=1)]
+        laws = {
+            name: p for event in listed if isinstance(event, Friction) for name, p in _law(event).parameters.items()
+        }
+        of_events = [e for event in listed for e in event.expressions]
+        (e, *_), own = _checked(what, [_parsed(what, energy), *of_events], parameters, ("_i", "_j", "_k"), laws)
         object.__setattr__(self, "energy", e)
-        object.__setattr__(self, "parameters", defaults)
-        if not {"_i", "_j"} <= {s.name[-2:] for s in self._of_ends()}:
-            raise ValueError(f"{what}: found {short_repr(e)}, of one end; expected a function of both")
+        object.__setattr__(self, "parameters", FrozenDict(sorted({**laws, **own}.items())))
+        object.__setattr__(self, "events", tuple(listed))
+        self._check_both_ends(what)
         # Each node of a triangle feels the derivative by its own coordinates.
-        orders = [self._exchanged("ij"), self._exchanged("jk")] if self.triadic else []
+        orders = [self._exchanged(e, "ij"), self._exchanged(e, "jk")] if self.triadic else []
         if any(sp.expand(e - other) != 0 and sp.simplify(e - other) != 0 for other in orders):
             raise ValueError(
                 f"{what}: found {short_repr(e)}, which changes if ends are exchanged; expected an energy of three equal ends"
             )
 
+    def _check_both_ends(self, what: str) -> None:
+        """Raise ValueError for an energy or an event of one end, and for events of three ends."""
+        for e in (self.energy, *(event.expressions[0] for event in self.events)):
+            ends = {s.name[-2:] for s in self._of_ends(e)}
+            if not {"_i", "_j"} <= ends and not (e == 0 and self.events):
+                raise ValueError(f"{what}: found {short_repr(e)}, of one end; expected a function of both")
+        if self.events and self.triadic:
+            raise ValueError(f"{what}: found events of three ends; expected contacts and stops between two nodes")
+
     def __reduce__(self) -> tuple[type[Potential], tuple[object, ...]]:
-        return Potential, (self.energy, dict(self.parameters))
+        return Potential, (self.energy, dict(self._own()), self.events)
+
+    def _own(self) -> dict[str, Parameter]:
+        """Return the parameters without those of friction laws that have the defaults of the law."""
+        laws = {
+            name: p
+            for event in self.events
+            if isinstance(event, Friction)
+            for name, p in _law(event).parameters.items()
+        }
+        return {name: p for name, p in self.parameters.items() if laws.get(name) != p}
+
+    @property
+    def oriented(self) -> bool:
+        """True if the energy or an event changes when the ends are exchanged."""
+        changes = sp.expand(self.energy - self._exchanged(self.energy, "ij")) != 0
+        return changes or any(map(self._tells_ends_apart, self.events))
+
+    @property
+    def laws(self) -> tuple[FrictionLaw, ...]:
+        """The friction laws of the contacts."""
+        return tuple(_law(event) for event in self.events if isinstance(event, Friction))
 
     @property
     def forced(self) -> bool:
         """True if time occurs."""
-        return self.energy.has(TIME)
+        return any(e.has(TIME) for e in (self.energy, *(e for event in self.events for e in event.expressions)))
 
     def canonical(self, state: tuple[str, ...], coordinates: tuple[str, ...]) -> Potential:
         """Return the coupling itself: equal energies have one spelling."""
@@ -231,35 +285,83 @@ class Potential:
     @property
     def triadic(self) -> bool:
         """True if the energy is that of a triangle: a symbol of a third end occurs."""
-        return any(s.name.endswith("_k") for s in self._of_ends())
+        return any(s.name.endswith("_k") for s in self._of_ends(self.energy))
 
-    def _exchanged(self, letters: str) -> sp.Expr:
-        """Return the energy with two ends exchanged."""
+    def _exchanged(self, e: sp.Expr, letters: str) -> sp.Expr:
+        """Return an expression with two ends exchanged."""
         swap = dict(zip(letters, reversed(letters), strict=True))
-        return self.energy.xreplace(
-            {s: sp.Symbol(s.name[:-1] + swap.get(s.name[-1], s.name[-1]), real=True) for s in self._of_ends()}
+        return e.xreplace(
+            {s: sp.Symbol(s.name[:-1] + swap.get(s.name[-1], s.name[-1]), real=True) for s in self._of_ends(e)}
         )
 
     def terms(self, pair: Pair) -> Terms:
         """Return the energy of a link; of a triangle, the half, since a node feels its two sources in both orders."""
-        if self.triadic:
-            return Terms(potential=_in_symbols_of(pair, self, self.energy) / 2)
-        if pair.nodes[0] != pair.nodes[1]:
-            return Terms(potential=_in_symbols_of(pair, self, self.energy))
-        # Between equal nodes compare the energy with the energy of exchanged ends: is the link oriented?
-        energy, oriented = directed(*(_in_symbols_of(pair, self, e) for e in (self.energy, self._exchanged("ij"))))
-        return Terms(potential=energy, oriented=oriented)
 
-    def _of_ends(self) -> set[sp.Symbol]:
-        return self.energy.free_symbols - _of_link(self.parameters)
+        def of_pair(e: sp.Expr) -> sp.Expr:
+            return _in_symbols_of(pair, self, e)
+
+        if self.triadic:
+            return Terms(potential=of_pair(self.energy) / 2)
+        directions = [event for event in self.events if self._tells_ends_apart(event)]
+        events = tuple(event.map(lambda _, e: of_pair(e), str) for event in self.events)
+        if pair.nodes[0] != pair.nodes[1]:
+            return Terms(potential=of_pair(self.energy), events=events)
+        # Between equal nodes compare the energy with the energy of exchanged ends: is the link oriented?
+        energy, oriented = directed(of_pair(self.energy), of_pair(self._exchanged(self.energy, "ij")))
+        if directions:
+            # the weight is the direction: 1 or -1 in the energy, and 1 in the events, which only one direction has
+            energy = energy if oriented else WEIGHT**2 * energy.xreplace({WEIGHT: sp.S.One})
+            events = tuple(event.map(lambda _, e: e.xreplace({WEIGHT: sp.S.One}), str) for event in events)
+        return Terms(potential=energy, oriented=oriented or bool(directions), events=events)
+
+    def _tells_ends_apart(self, event: Friction | Stop) -> bool:
+        """Return True if an event changes when the ends are exchanged; the sign of a sliding velocity is arbitrary."""
+        level, size = event.expressions
+        other, other_size = (self._exchanged(e, "ij") for e in event.expressions)
+        same = sp.expand(level - other) == 0 or (isinstance(event, Friction) and sp.expand(level + other) == 0)
+        return not (same and sp.expand(size - other_size) == 0)
+
+    def _of_ends(self, e: sp.Expr) -> set[sp.Symbol]:
+        return e.free_symbols - _of_link(self.parameters)
 
     def as_dict(self) -> dict[str, object]:
-        """Return the coupling as a table of a scene file."""
-        return {"potential": _written(self.energy), "parameters": _tables(self.parameters)}
+        """Return the coupling as a table of a scene file, without its events."""
+        return {"potential": self.write(self.energy), "parameters": _tables(self._own())}
+
+    def write(self, e: sp.Expr) -> str:
+        """Return the text of an expression of the link."""
+        return _written(e)
 
     def __str__(self) -> str:
-        names = dict.fromkeys(sorted(s.name[:-2] for s in self._of_ends()))
+        parts = (self.energy, *(e for event in self.events for e in event.expressions))
+        names = dict.fromkeys(sorted(s.name[:-2] for e in parts for s in self._of_ends(e)))
         return f"potential of {', '.join(names)}"
+
+
+def _event(k: int, event: object) -> Friction | Stop:
+    """Return a contact or stop of a link with exact expressions and its law."""
+    what = f"potential of a link: event {k}"
+    check_instance(what, event, (Friction, Stop), "a Friction or a Stop")
+    assert isinstance(event, Friction | Stop)
+
+    def change(part: str, e: object) -> sp.Expr:
+        return _exact(f"{what}: {part}", _parsed(f"{what}: {part}", e))
+
+    made = event.map(change, str)
+    if not isinstance(made, Friction):
+        return made
+    if made.law is None:
+        raise ValueError(f"{what}: found no friction law; expected law='coulomb', or a law that friction_law(…) makes")
+    check_instance(f"{what}: law", made.law, (str, FrictionLaw), "a name, or a friction_law(…)")
+    law = load_friction_law(made.law) if isinstance(made.law, str) else made.law
+    if not law.jumps:
+        raise ValueError(f"{what}: found the law {law}, which has no jump at w = 0; write its force as Rates")
+    return replace(made, law=law)
+
+
+def _law(event: Friction) -> FrictionLaw:
+    assert isinstance(event.law, FrictionLaw)
+    return event.law
 
 
 def _of_link(names: Iterable[str]) -> set[sp.Symbol]:
@@ -272,10 +374,11 @@ def _checked(
     values: Iterable[object],
     parameters: Mapping[sp.Symbol | str, object] | None,
     ends: tuple[str, ...] = ("_i", "_j"),
+    of_laws: Iterable[str] = (),
 ) -> tuple[tuple[sp.Expr, ...], FrozenDict[Parameter]]:
     """Return the expressions and parameters of a coupling, with every symbol declared and every parameter used."""
     table = _parameters(what, parameters)
-    of_link = _of_link(table)
+    of_link = _of_link((*table, *of_laws))
     expressions = tuple(_exact(what, e) for e in values)
     used = {s for e in expressions for s in e.free_symbols}
     for s in sorted(used - of_link, key=lambda s: s.name):
@@ -287,9 +390,9 @@ def _checked(
                 f"{', '.join(table) or '(none)'}; give it a default{meant}"
             )
     for name in table:  # in the order of the alphabet
-        if sp.Symbol(name, real=True) not in used:
+        if sp.Symbol(name, real=True) not in used and name not in of_laws:
             raise ValueError(f"{what}: nothing uses the parameter {name!r}; use it or leave it out")
-    if WEIGHT not in used:
+    if WEIGHT not in used and expressions[0] != 0:
         raise ValueError(f"{what}: nothing uses the weight of a link; expected it as a factor, e.g. W*sin(j.x - i.x)")
     unknown = next(
         (f for e in expressions for f in sorted(e.atoms(AppliedUndef, sp.Derivative, sp.Integral), key=str)), None
@@ -387,16 +490,22 @@ def _plain(default: float) -> Parameter:
     return Parameter(default, "1", "parameter of a link")
 
 
-def from_table(what: str, table: Mapping[object, object]) -> Rates | Potential:
-    """Return the coupling of a table of a scene file, {rates = {x = "…"}, parameters = {…}} or {potential = "…", …}."""
+def from_table(what: str, table: Mapping[object, object], events: Sequence[EventDefinition] = ()) -> Rates | Potential:
+    """Return the coupling of a table of a scene file, {rates = {x = "…"}, parameters = {…}} or {potential = "…", …}.
+
+    `events` are those of the table.
+    """
     kinds = sorted(str(key) for key in table if key in ("rates", "potential"))
-    if len(kinds) != 1 or any(key not in (*kinds, "parameters") for key in table):
+    known = (*kinds, "parameters", *(["events"] if kinds == ["potential"] else []))
+    if len(kinds) != 1 or any(key not in known for key in table):
         found = ", ".join(map(short_repr, table)) or "nothing"
-        raise ValueError(f"{what}: found {found}; expected either 'rates' or 'potential', with 'parameters'")
+        raise ValueError(
+            f"{what}: found {found}; expected either 'rates' or 'potential', with 'parameters', and 'events' of a potential"
+        )
     parameters = check_table(f"{what}: parameters", table.get("parameters", {}))
     named = {str(name): value for name, value in parameters.items()}
     if kinds == ["potential"]:
-        return Potential(table["potential"], named)
+        return Potential(table["potential"], named, events)
     return Rates(check_table(f"{what}: rates", table["rates"]), named)
 
 

@@ -8,17 +8,20 @@ ends keeps V_even and changes the sign of V_odd.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import sympy as sp
 
+from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Block, Edge, Node
+from ..mechanics.contact import ContactModel, FrictionLaw
+from ..mechanics.impacts import Stop
 from ..mechanics.lagrangian import Mechanics, mass_matrix, solve_masses
-from ..mechanics.nondimensional import nondimensional
+from ..mechanics.nondimensional import friction_coefficient, nondimensional, static_coefficient
 from ..mechanics.oscillator import FieldModel, Oscillator
-from ..mechanics.rows import projection
+from ..mechanics.rows import Law, Surface, check_surfaces, friction_surface, projection
 from .coupling import WEIGHT, Coupling
 from .ends import Pair, Terms
 
@@ -59,13 +62,72 @@ def edge(
     else:
         rates, inertia = terms.rates, ()
 
+    surfaces = _surfaces(coupling, pair, terms)
     # Parameters of the edge: all parameters of the coupling, and parameters of the nodes that occur in the terms.
-    used = {s for e in (*rates, *(e for block in inertia for row in block for e in row)) for s in e.free_symbols}
+    entries = (
+        *rates,
+        *(e for block in inertia for row in block for e in row),
+        *(e for s in surfaces for e in s.expressions),
+    )
+    used = {s for e in entries for s in e.free_symbols}
     strengths = tuple(sp.Symbol(name, real=True) for name in coupling.parameters)
     symbols = tuple(s for s in single.parameters if s not in strengths and s in used)
     theirs = tuple((s, parameter) for s, parameter in pair.theirs.items() if s in used)
     beyond = pair.beyond if used & set(pair.beyond) else ()
-    return Edge(pair.here, pair.there, WEIGHT, rates, (*strengths, *symbols), inertia, theirs, terms.oriented, beyond)
+    parameters = (*strengths, *symbols)
+    return Edge(pair.here, pair.there, WEIGHT, rates, parameters, inertia, theirs, terms.oriented, beyond, surfaces)
+
+
+def _surfaces(coupling: Coupling, pair: Pair, terms: Terms) -> tuple[Surface, ...]:
+    """Return the rows of a link; its forces and impulses act on both ends along the gradient of the level."""
+    if not terms.events:
+        return ()
+    # the inverse masses of each end, in the symbols of that end
+    of_source = {parameter: s for s, parameter in pair.theirs.items()}
+    ends: list[tuple[Oscillator | None, Node, Symbols, dict[sp.Symbol, sp.Symbol]]] = [
+        (pair.oscillators[0], pair.nodes[0], pair.here, {}),
+        (pair.oscillators[1], pair.nodes[1], pair.there, of_source),
+    ]
+    if any(node.inertia for _, node, *_ in ends):
+        raise ValueError(
+            f"coupling '{coupling}': found events between nodes with a mass matrix; expected at most three coupled coordinates"
+        )
+    masses = [_masses(oscillator, node, states).xreplace(named) for oscillator, node, states, named in ends]
+
+    def push(slopes: Callable[[sp.Symbol], sp.Expr], moved: int) -> tuple[sp.Expr, ...]:
+        """Return M^-1 times the slopes by the coordinates (moved = 0) or the velocities (1) of both ends."""
+        column: list[sp.Expr] = []
+        for matrix, (_, _, states, _) in zip(masses, ends, strict=True):
+            half = len(states) // 2
+            by = states[half:] if moved else states[:half]
+            column += [*[sp.S.Zero] * half, *solve_masses(matrix, [slopes(s) for s in by], states[half:])]
+        return tuple(column)
+
+    surfaces = []
+    for event in terms.events:
+        speeds = {*pair.velocities}
+        if isinstance(event, Stop):
+            if event.gap.free_symbols & speeds:
+                raise ValueError(
+                    f"coupling '{coupling}': found the gap {event.gap}; expected a function of coordinates and time"
+                )
+            column = push(partial(derivative, event.gap), 0)
+            surfaces.append(Surface(Law.STOP, event.gap, column, event.restitution))
+            continue
+        sliding = sp.expand(event.sliding)
+        slopes = [derivative(sliding, v) for v in pair.velocities]
+        if all(e == 0 for e in slopes) or any(e.free_symbols & speeds for e in slopes):
+            raise ValueError(
+                f"coupling '{coupling}': found the sliding velocity {sliding}; expected a linear function of velocities"
+            )
+        # virtual work: the force on a coordinate is -load f(w) dw/dv
+        pull = tuple(-event.load * e for e in push(partial(derivative, sliding), 1))
+        w, law = sp.Dummy("w", real=True), event.law
+        assert isinstance(law, FrictionLaw)
+        coefficient = friction_coefficient(law, ContactModel.SET_VALUED)
+        surfaces.append(friction_surface(sliding, pull, coefficient(w), w, static_coefficient(law)))
+    check_surfaces(surfaces)
+    return tuple(surfaces)
 
 
 def strength(edge: Edge, parameters: Iterable[sp.Symbol] = ()) -> sp.Symbol:

@@ -9,8 +9,9 @@ from typing import TypeAlias
 import sympy as sp
 
 from .calculus import derivative
+from .contact import SLIP
 from .events import Event
-from .rows import Law, Row
+from .rows import Law, Row, Surface
 
 TIME = sp.Symbol("t", real=True)
 """Non-dimensional time, the one time symbol of all equations."""
@@ -31,6 +32,10 @@ class Node:
     parameters: tuple[sp.Symbol, ...]
     events: tuple[Event, ...] = ()  # friction of one coordinate on a ground of constant velocity: at most one
     rows: tuple[Row, ...] = ()  # all other surfaces at which rates jump or states are reset
+    # Of networks with rows in links: rows that are solved with those of links (`Equations.parts`); their modes, then the
+    # modes of the rows of links of which this node is the source. `rhs` holds the rates with all x = 0.
+    surfaces: tuple[Surface, ...] = ()
+    joined: tuple[sp.Symbol, ...] = ()
     law: sp.Expr | None = field(default=None, compare=False)  # friction coefficient in terms of `SLIDING`, for printing
     inertia: Block = ()  # m(state; parameters), a row and a column for each state; empty if M is the identity
 
@@ -45,6 +50,8 @@ class Node:
             _check("contact", event.expressions, len(event.expressions), declared)
         for held in self.rows:
             _check("row", held.expressions, len(held.expressions), declared)
+        for surface in self.surfaces:
+            _check("row", surface.expressions, len(surface.expressions), declared)
         if self.inertia and self.sticks:
             raise ValueError("node: found events beside a mass matrix; expected at most three coupled coordinates")
         if self.inertia and len(self.inertia) != size:
@@ -59,9 +66,14 @@ class Node:
             _check("node inertia", row, size, declared - {TIME})
 
     @property
+    def driven(self) -> tuple[sp.Expr, ...]:
+        """The right-hand side, and the rows that it does not contain."""
+        return (*self.rhs, *(e for surface in self.surfaces for e in surface.expressions))
+
+    @property
     def forced(self) -> bool:
         """True if time occurs explicitly."""
-        return any(e.has(TIME) for e in self.rhs)
+        return any(e.has(TIME) for e in self.driven)
 
     @property
     def continuous(self) -> tuple[sp.Symbol, ...]:
@@ -71,7 +83,8 @@ class Node:
     @property
     def modes(self) -> tuple[sp.Symbol, ...]:
         """The states that change only at events, behind the continuous ones."""
-        return (*(e.mode for e in self.events), *(row.mode for row in self.rows if row.law is not Law.RESET))
+        of_rows = (row.mode for row in self.rows if row.law is not Law.RESET)
+        return (*(e.mode for e in self.events), *of_rows, *self.joined)
 
     @property
     def held(self) -> tuple[tuple[sp.Symbol, sp.Symbol], ...]:
@@ -89,13 +102,13 @@ class Node:
 
     @property
     def sticks(self) -> bool:
-        """True if the node has events or rows."""
-        return bool(self.conditions)
+        """True if the node has events or rows, or links with rows."""
+        return bool(self.conditions or self.surfaces or self.joined)
 
     @property
     def expressions(self) -> tuple[sp.Expr, ...]:
         """The right-hand side, the conditions of events and the entries of M."""
-        conditions = (e for condition in self.conditions for e in condition.expressions)
+        conditions = (e for condition in (*self.conditions, *self.surfaces) for e in condition.expressions)
         return (*self.rhs, *conditions, *_entries((self.inertia,)))
 
     @property
@@ -107,10 +120,10 @@ class Node:
         """Return the node with every symbol and expression changed."""
         state, rhs, parameters = (tuple(map(change, part)) for part in (self.state, self.rhs, self.parameters))
         events, rows = tuple(e.map(change) for e in self.events), tuple(row.map(change) for row in self.rows)
+        surfaces, joined = tuple(s.map(change) for s in self.surfaces), tuple(map(change, self.joined))
         # Drop parameters that `change` replaced by numbers.
-        return Node(
-            state, rhs, tuple(p for p in parameters if p.is_Symbol), events, rows, inertia=_mapped(self.inertia, change)
-        )
+        parameters = tuple(p for p in parameters if p.is_Symbol)
+        return Node(state, rhs, parameters, events, rows, surfaces, joined, inertia=_mapped(self.inertia, change))
 
     def without_unused_parameters(self, needed: Container[sp.Symbol] = ()) -> Node:
         """Return the node without parameters that occur neither in its expressions nor in `needed` (by links)."""
@@ -140,6 +153,8 @@ class Edge:
     theirs: tuple[tuple[sp.Symbol, sp.Symbol], ...] = ()  # pairs: symbol in `rhs`, parameter of the source
     oriented: bool = False
     beyond: tuple[sp.Symbol, ...] = ()  # states of the second source of a link of three ends; empty for two ends
+    # Rows of the link; pushes have an entry for each continuous state of the target, then of the source.
+    surfaces: tuple[Surface, ...] = ()
 
     def __post_init__(self) -> None:
         sources, states = tuple(s for s, _ in self.theirs), [s for end in self.end_states for s in end]
@@ -149,6 +164,8 @@ class Edge:
         for block in self.inertia:
             for row in block:
                 _check("edge inertia", row, len(row), declared)
+        for surface in self.surfaces:
+            _check("edge", surface.expressions, len(surface.expressions), {TIME, SLIP, *declared, *sources})
 
     @property
     def end_states(self) -> tuple[tuple[sp.Symbol, ...], ...]:
@@ -172,14 +189,19 @@ class Edge:
         return tuple(derivative(e, TIME) for e in self.rhs)
 
     @property
+    def driven(self) -> tuple[sp.Expr, ...]:
+        """The right-hand side and the rows."""
+        return (*self.rhs, *(e for surface in self.surfaces for e in surface.expressions))
+
+    @property
     def forced(self) -> bool:
         """True if time occurs explicitly."""
-        return any(e.has(TIME) for e in self.rhs)
+        return any(e.has(TIME) for e in self.driven)
 
     @property
     def expressions(self) -> tuple[sp.Expr, ...]:
-        """The right-hand side and the entries of the inertia."""
-        return (*self.rhs, *_entries(self.inertia))
+        """The right-hand side, the entries of the inertia and the rows."""
+        return (*self.driven, *_entries(self.inertia))
 
     @property
     def acts(self) -> bool:
@@ -208,6 +230,7 @@ class Edge:
             parameters=tuple(p for p in parameters if p.is_Symbol),
             inertia=inertia if any(e != 0 for e in _entries(inertia)) else (),
             theirs=tuple((change(a), change(b)) for a, b in self.theirs),
+            surfaces=tuple(surface.map(change) for surface in self.surfaces),
         )
 
     def without_unused_parameters(self) -> Edge:
@@ -224,14 +247,16 @@ class Edge:
         more = tuple(parameter for parameter in shared.values() if parameter not in self.parameters)
         theirs = tuple(pair for pair in self.theirs if pair[0] not in shared)
         rhs = tuple(e.xreplace(shared) for e in self.rhs)
-        return replace(self, rhs=rhs, parameters=(*self.parameters, *more), theirs=theirs)
+        surfaces = tuple(surface.map(lambda e: e.xreplace(shared)) for surface in self.surfaces)
+        return replace(self, rhs=rhs, parameters=(*self.parameters, *more), theirs=theirs, surfaces=surfaces)
 
     def with_weight_number(self) -> Edge:
         """Return the edge with the parameter `WEIGHT_NUMBER` in place of the weight."""
         swap = {self.weight: WEIGHT_NUMBER}
         inertia = tuple(_mapped(block, lambda e: e.xreplace(swap)) for block in self.inertia)
         rhs = tuple(e.xreplace(swap) for e in self.rhs)
-        return replace(self, rhs=rhs, parameters=(*self.parameters, WEIGHT_NUMBER), inertia=inertia)
+        surfaces = tuple(surface.map(lambda e: e.xreplace(swap)) for surface in self.surfaces)
+        return replace(self, rhs=rhs, parameters=(*self.parameters, WEIGHT_NUMBER), inertia=inertia, surfaces=surfaces)
 
     @property
     def diffusive(self) -> bool:

@@ -26,6 +26,9 @@ from .contact import SLIDING, SLIP, beyond_rest, coefficient_at_rest, in_slip
 MOST_ROWS = 3
 """Most rows of a node that can be held (a choice): x is solved in symbols by minors, which are short for three rows."""
 
+MOST_JOINED = 8
+"""Most rows that can be held in a part, the nodes that rows of links join (a choice): an event tries up to 3**8 sets."""
+
 TIME = sp.Symbol("t", real=True)
 
 NO_MODE = sp.Symbol("no mode", real=True)
@@ -55,6 +58,22 @@ class Surface:
     ratio: sp.Expr = sp.S.One  # SIGN: static over kinetic friction; STOP: restitution
     sets: tuple[tuple[sp.Symbol, sp.Expr], ...] = ()  # RESET: the values just after
     name: str = ""  # ending of the name of the mode if a node has several
+
+    @property
+    def expressions(self) -> Column:
+        """All expressions; a push contains `SLIP` in place of the mode."""
+        return self.level, *self.push, self.ratio, *(e for _, e in self.sets)
+
+    def in_mode(self, mode: sp.Symbol) -> Surface:
+        """Return the surface with its mode in place of `SLIP`."""
+        return self.map(lambda e: e.xreplace({SLIP: mode}))
+
+    def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Surface:
+        """Return the surface with every symbol and expression changed."""
+        sets = tuple((change(s), change(e)) for s, e in self.sets)
+        return replace(
+            self, level=change(self.level), push=tuple(map(change, self.push)), ratio=change(self.ratio), sets=sets
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,9 +149,22 @@ def with_rows(
 
     speeds: maps each velocity to its coordinate.
     """
-    _check_surfaces(surfaces)
+    check_surfaces(surfaces)
+    modes = modes_of(surfaces)
+    rows = rows_of(state, rates, surfaces, modes, speeds)
+    total = [sp.sympify(f) + added for f, added in zip(rates, added_rates(rows, len(state)), strict=True)]
+    return (*state, *modes), (*total, *[sp.S.Zero] * len(modes)), rows
+
+
+def rows_of(
+    state: Sequence[sp.Symbol],
+    rates: Sequence[sp.Expr],
+    surfaces: Sequence[Surface],
+    modes: Sequence[sp.Symbol],
+    speeds: Mapping[sp.Symbol, sp.Symbol],
+) -> tuple[Row, ...]:
+    """Return the row of each surface, with one of `modes` for each that can be held; see `with_rows`."""
     held = [surface for surface in surfaces if surface.law is not Law.RESET]
-    modes = _modes(held)
     inside = [[e.xreplace({SLIP: mode}) for e in surface.push] for surface, mode in zip(held, modes, strict=True)]
     along = list(map(sp.sympify, rates))
 
@@ -151,11 +183,13 @@ def with_rows(
     ]
     laws = [surface.law for surface in held]
     x = forces(laws, modes, stiffness, biases)
+    # in larger parts the forces of links are among the rates, so that none is added later
+    inverse = _inverse(modes, stiffness) if len(held) <= MOST_ROWS else [()] * len(held)
     answers = [
         tuple(
             sp.Add(*(e * (1 - modes[b] ** 2) * gradients[b][c] for b, e in enumerate(row))) for c in range(len(state))
         )
-        for row in _inverse(modes, stiffness)
+        for row in inverse
     ]
     rows, places = [], dict(zip(state, range(len(state)), strict=True))
     for surface in surfaces:
@@ -174,8 +208,12 @@ def with_rows(
             Row(surface.law, modes[a], surface.level, levels[a], biases[a], gradients[a], tuple(inside[a]), stiffness[a],
                 surface.ratio, x[a], tuple(lift), answers[a])
         )  # fmt: skip
-    total_rates = [f + sp.Add(*(push[c] * x[a] for a, push in enumerate(inside))) for c, f in enumerate(along)]
-    return (*state, *modes), (*total_rates, *[sp.S.Zero] * len(modes)), tuple(rows)
+    return tuple(rows)
+
+
+def added_rates(rows: Sequence[Row], size: int) -> list[sp.Expr]:
+    """Return what the x of all rows add to the rates of `size` continuous states."""
+    return [sp.Add(*(row.push[c] * row.x for row in rows if row.law is not Law.RESET)) for c in range(size)]
 
 
 def forces(
@@ -189,7 +227,34 @@ def forces(
         (1 - mode**2) * rate + (mode if law is Law.SIGN else sp.S.Zero)
         for law, mode, rate in zip(laws, modes, rates, strict=True)
     ]
+    if len(modes) > MOST_ROWS:
+        return _eliminated(_masked(modes, stiffness), right)
     return [sp.Add(*(e * c for e, c in zip(row, right, strict=True))) for row in _inverse(modes, stiffness)]
+
+
+def _masked(modes: Sequence[sp.Symbol], stiffness: Sequence[Column]) -> list[list[sp.Expr]]:
+    """Return A = D K + (1 - D)."""
+    size = len(modes)
+    return [
+        [(1 - modes[a] ** 2) * stiffness[a][b] + (modes[a] ** 2 if a == b else 0) for b in range(size)]
+        for a in range(size)
+    ]
+
+
+def _eliminated(matrix: list[list[sp.Expr]], right: list[sp.Expr]) -> list[sp.Expr]:
+    """Solve A x = right without a search for pivots: leading minors are positive if K is a P-matrix."""
+    size = len(right)
+    for k in range(size):
+        for r in range(k + 1, size):
+            if matrix[r][k] != 0:
+                factor = matrix[r][k] / matrix[k][k]
+                for c in range(k + 1, size):
+                    matrix[r][c] -= factor * matrix[k][c]
+                right[r] -= factor * right[k]
+    for k in reversed(range(size)):
+        known = sp.Add(*(matrix[k][c] * right[c] for c in range(k + 1, size)))
+        right[k] = (right[k] - known) / matrix[k][k]
+    return right
 
 
 def projection(rows: Sequence[Row], plain: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
@@ -226,9 +291,13 @@ def off_surfaces(rates: Sequence[sp.Expr], rows: Sequence[Row]) -> tuple[sp.Expr
 
 
 def _by_sign(e: sp.Expr, row: Row) -> sp.Expr:
-    """Return s e of a push e with the sign s of the level in place of the mode."""
-    sign = sp.sign(row.level)
-    return sign * e.xreplace({row.mode: sign}).xreplace({sign**2: sp.S.One})
+    return in_signs(e, row.level, row.mode)
+
+
+def in_signs(e: sp.Expr, level: sp.Expr, mode: sp.Symbol) -> sp.Expr:
+    """Return s e of a push e with the sign s of the level in place of the mode, for printing."""
+    sign = sp.sign(level)
+    return sign * e.xreplace({mode: sign}).xreplace({sign**2: sp.S.One})
 
 
 def friction_surface(
@@ -247,8 +316,9 @@ def friction_surface(
     return Surface(Law.SIGN, sliding, tuple(e * size for e in pull), ratio)
 
 
-def _modes(held: Sequence[Surface]) -> list[sp.Symbol]:
+def modes_of(surfaces: Sequence[Surface]) -> list[sp.Symbol]:
     """Return the symbols of the modes: slip or open, with an ending where there are several."""
+    held = [surface for surface in surfaces if surface.law is not Law.RESET]
     stems = ["open" if surface.law is Law.STOP else "slip" for surface in held]
     endings = [surface.name and f"_{surface.name}" for surface in held]
     names = [stem if stems.count(stem) == 1 else f"{stem}{ending}" for stem, ending in zip(stems, endings, strict=True)]
@@ -259,7 +329,7 @@ def _modes(held: Sequence[Surface]) -> list[sp.Symbol]:
     return [sp.Symbol(name, real=True) for name in unique]
 
 
-def _check_surfaces(surfaces: Sequence[Surface]) -> None:
+def check_surfaces(surfaces: Sequence[Surface]) -> None:
     """Raise ValueError for rows that no motion determines."""
     held = [surface for surface in surfaces if surface.law is not Law.RESET]
     if len(held) > MOST_ROWS:
@@ -275,11 +345,7 @@ def _check_surfaces(surfaces: Sequence[Surface]) -> None:
 
 def _inverse(modes: Sequence[sp.Symbol], stiffness: Sequence[Column]) -> list[list[sp.Expr]]:
     """Return the inverse of A = D K + (1 - D) by minors, group by group of rows that feel each other."""
-    size = len(modes)
-    matrix = [
-        [(1 - modes[a] ** 2) * stiffness[a][b] + (modes[a] ** 2 if a == b else 0) for b in range(size)]
-        for a in range(size)
-    ]
+    size, matrix = len(modes), _masked(modes, stiffness)
     inverse: list[list[sp.Expr]] = [[sp.S.Zero] * size for _ in range(size)]
     left = set(range(size))
     while left:

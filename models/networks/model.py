@@ -76,7 +76,8 @@ class Model:
     def __post_init__(self) -> None:
         # Several kinds, several layers and forced links need events as rows.
         rows = len(self.kinds) > 1 or len(self.linked) > 1 or any(coupling.forced for coupling, _ in self.linked)
-        object.__setattr__(self, "unlinked", _unlinked(self.kinds, self.kind_of, self.contact, rows))
+        of_links = network.modes_of_links(self.linked, self.kind_of)
+        object.__setattr__(self, "unlinked", _unlinked(self.kinds, self.kind_of, self.contact, rows, of_links))
         couplings = tuple(coupling for coupling, _ in self.linked)
         object.__setattr__(self, "parameters", _parameters(self.kinds, self.contact, couplings))
 
@@ -255,9 +256,17 @@ class Model:
 
 
 @lru_cache(maxsize=64)
-def _unlinked(kinds: tuple[NodeKind, ...], kind_of: tuple[int, ...], contact: ContactModel, rows: bool) -> Equations:
+def _unlinked(
+    kinds: tuple[NodeKind, ...],
+    kind_of: tuple[int, ...],
+    contact: ContactModel,
+    rows: bool,
+    of_links: tuple[tuple[str, ...], ...] | None,
+) -> Equations:
     """Return the equations of nodes without links."""
-    nodes = [network.node(kind.oscillator, kind.friction, contact, rows) for kind in kinds]
+    modes = [None] * len(kinds) if of_links is None else of_links
+    pairs = zip(kinds, modes, strict=True)
+    nodes = [network.node(kind.oscillator, kind.friction, contact, rows, names) for kind, names in pairs]
     return network.layered_network([kind.oscillator for kind in kinds], nodes, kind_of, ())
 
 

@@ -15,9 +15,9 @@ import sympy as sp
 from ..dynamics.equations import Equations
 from ..inputs.checks import check_instance
 from ..mechanics.components import TIME, WEIGHT_NUMBER, Edge, Node
-from ..mechanics.contact import SLIDING
+from ..mechanics.contact import SLIDING, SLIP
 from ..mechanics.oscillator import FRICTION
-from ..mechanics.rows import Law, off_surfaces
+from ..mechanics.rows import Law, Row, Surface, in_signs, off_surfaces
 from .writer import ExpressionWriter, Latex, Style, Text
 
 LARGEST = 6
@@ -104,7 +104,8 @@ def as_dict(equations: Equations) -> dict[str, object]:
 def lines(equations: Equations, style: Style) -> Iterator[str]:
     """Yield the equations, then the friction laws, then for a large network the meaning of the indices."""
     network = _NetworkText(_in_slip(equations), style)
-    rows = [row for node in equations.nodes for row in node.rows]
+    rows: list[Row | Surface] = [row for node in equations.nodes for row in node.rows]
+    rows += [surface for template in equations.templates for surface in template.surfaces]
     generic = network.equations.n > LARGEST and not network.equations.mixed
     if generic:
         yield from network.generic()
@@ -112,18 +113,17 @@ def lines(equations: Equations, style: Style) -> Iterator[str]:
         for i in range(network.equations.n):
             yield from network.at_node(i)
     yield from network.laws()
-    for node in equations.nodes:
-        yield from _events(node, style)
+    yield from dict.fromkeys(_events(rows, style))  # both directions of a link have the same stop
     if any(node.events for node in equations.nodes) or any(row.law is Law.SIGN for row in rows):
         yield style.words("at zero sliding velocity f is what holds the body, up to the static coefficient")
     if generic:
         yield network.legend()
 
 
-def _events(node: Node, style: Style) -> Iterator[str]:
-    """Yield what happens at the stops and guards of a node."""
+def _events(rows: Sequence[Row | Surface], style: Style) -> Iterator[str]:
+    """Yield what happens at stops and guards."""
     writer = ExpressionWriter(style, {}, frozenset())
-    for row in node.rows:
+    for row in rows:
         if row.law is Law.STOP:
             gap, times = style.words("stop at the gap "), style.words(": its rate is reversed times ")
             yield f"{gap}{writer.write(row.level)}{times}{writer.write(row.ratio)}"
@@ -141,6 +141,14 @@ def _in_slip(equations: Equations) -> Equations:
     def node(node: Node) -> Node:
         if node.rows:
             return Node(node.continuous, off_surfaces(node.rhs, node.rows), node.parameters, law=node.law)
+        if node.joined or node.surfaces:
+            rates = list(node.rhs[: len(node.continuous)])
+            held = (surface for surface in node.surfaces if surface.law is not Law.RESET)
+            for surface, mode in zip(held, node.joined, strict=False):
+                if surface.law is Law.SIGN:
+                    signs = [in_signs(e, surface.level, mode) for e in surface.push]
+                    rates = [sp.expand(rate) + e for rate, e in zip(rates, signs, strict=True)]
+            return Node(node.continuous, tuple(rates), node.parameters, law=node.law)
         if not node.events:
             return node
         return Node(node.state[:2], (node.rhs[0], node.events[0].shown), node.parameters, law=node.law)
@@ -148,10 +156,28 @@ def _in_slip(equations: Equations) -> Equations:
     def edge(edge: Edge) -> Edge:
         here, there = ([s for s in end if s.name.rpartition("_")[0] not in modes] for end in (edge.here, edge.there))
         free = {s: sp.S.One for s in edge.here if s not in here}
-        rates = tuple(e.xreplace(free) for e in edge.rhs[: len(here)])
-        return replace(edge, here=tuple(here), there=tuple(there), rhs=rates).without_unused_parameters()
+        rates = [e.xreplace(free) for e in edge.rhs[: len(here)]]
+        for surface in edge.surfaces:
+            if surface.law is Law.SIGN:
+                rates = [a + b for a, b in zip(rates, _signs_of_link(edge, surface, here, there), strict=True)]
+        plain = replace(edge, here=tuple(here), there=tuple(there), rhs=tuple(rates), surfaces=())
+        return plain.without_unused_parameters()
 
-    return equations.map_templates(node, edge)
+    apart = equations.layers if not equations.joined else tuple(replace(layer, held=()) for layer in equations.layers)
+    return replace(equations, layers=apart).map_templates(node, edge)
+
+
+def _signs_of_link(
+    edge: Edge, surface: Surface, here: Sequence[sp.Symbol], there: Sequence[sp.Symbol]
+) -> list[sp.Expr]:
+    """Return what a contact of a link adds to the rates of its target off the surface."""
+    signs = [in_signs(e, surface.level, SLIP) for e in surface.push]
+    if not edge.oriented:
+        return signs[: len(here)]
+    # W = 1 at the end i of the link, W = -1 at the end j, which feels what the source does with exchanged ends
+    swap = {**dict(zip(here, there, strict=True)), **dict(zip(there, here, strict=True))}
+    ahead, back = signs[: len(here)], [e.xreplace(swap) for e in signs[len(here) :]]
+    return [(1 + edge.weight) / 2 * a + (1 - edge.weight) / 2 * b for a, b in zip(ahead, back, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -71,7 +71,7 @@ def schema() -> Table:
 
 def _rows() -> dict[str, Table]:
     """Return the rows of keywords that the type of the keyword does not determine."""
-    oscillator, friction = _written_out()
+    oscillator, friction, events_of_links = _written_out()
     group = {"oscillator": oscillator, "friction": friction, "at": {"type": "array", "items": WHOLE, "minItems": 1}}
     uniform = {"low": NUMBER, "high": NUMBER, "rng": _of_type("rng", int)}
     span = {"from": NUMBER, "to": NUMBER, "count": {"type": "integer", "minimum": 1, "maximum": AXIS_LIMIT}}
@@ -87,7 +87,7 @@ def _rows() -> dict[str, Table]:
     tables = [
         _table({"energies": EXPRESSIONS, **link}, "energies"),
         _table({"rates": expressions, "parameters": {"type": "object"}}, "rates"),
-        _table({"potential": NUMBER, "parameters": {"type": "object"}}, "potential"),
+        _table({"potential": NUMBER, "parameters": {"type": "object"}, "events": events_of_links}, "potential"),
     ]
     components = {"type": "string", "pattern": "->| on "}
     coupling = {"anyOf": [*_part(COUPLING, "none")["anyOf"], components, *tables]}
@@ -161,8 +161,8 @@ def _part(kind: PluginKind, *words: str) -> Table:
     return {"anyOf": [{"enum": [*plugins.names(kind), *words]}, FILE]}
 
 
-def _written_out() -> tuple[Table, Table]:
-    """Return the rows of an oscillator and of a friction law: a name, or a table of expressions."""
+def _written_out() -> tuple[Table, Table, Table]:
+    """Return the rows of an oscillator and of a friction law, a name or a table of expressions, and of events of links."""
     anything: Table = {"type": "object"}
     contact = {"enum": [str(word) for word in ContactModel]}
     law = _part(FRICTION_LAW, "none", "default")
@@ -180,7 +180,8 @@ def _written_out() -> tuple[Table, Table]:
     energies = {"coordinates": anything, "kinetic": NUMBER, "potential": NUMBER, "dissipation": NUMBER}
     more = {"forces": EXPRESSIONS, "friction": friction, "contact": contact, "scaling": anything}
     lagrangian = _table({**common, **energies, **more}, "coordinates", "kinetic")
-    return {"anyOf": [*_part(OSCILLATOR)["anyOf"], field, lagrangian]}, friction
+    of_links: Table = {"type": "array", "items": {"anyOf": events[:2]}}  # contacts and stops
+    return {"anyOf": [*_part(OSCILLATOR)["anyOf"], field, lagrangian]}, friction, of_links
 
 
 def _graphs() -> list[Table]:

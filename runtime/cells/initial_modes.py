@@ -80,7 +80,7 @@ def local_clock(equations: Equations, period: np.ndarray) -> np.ndarray:
     Times of events are read from the clock, with its rounding error. If time does not enter the equations, the period
     may have any length; a short one keeps the digits of events in long runs.
     """
-    if not equations.sticks or any(e.has(TIME) for node in equations.nodes for e in node.expressions):
+    if not equations.sticks or any(e.has(TIME) for template in equations.templates for e in template.expressions):
         return period
     return np.full(len(period), CLOCK)
 

@@ -189,6 +189,8 @@ class Sections:
     def owners(self) -> list[tuple[int, int]]:
         """The node, and the number in the node, of each contact or row in the order of the kernel: kind after kind."""
         equations = self.scene.equations
+        if equations.joined:
+            return [owner for part in equations.parts for owner in part.owners]
         nodes = sorted(range(equations.n), key=equations.kind_of.__getitem__)
         return [(i, a) for i in nodes for a in range(len(equations.node_at(i).conditions))]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -26,6 +26,8 @@ def row_modes(equations: Equations, start: np.ndarray, parameters: np.ndarray, s
         sp.Symbol(p, real=True): c[:, None] for p, c in zip(equations.parameters, parameters.T, strict=True)
     }
     values[TIME] = np.zeros((len(states), 1))
+    if equations.joined:
+        return _modes_of_parts(equations, states, values, slack)
     places = equations.places
     open_rows: list[tuple[int, int, int]] = []  # cell, node and row on its surface
     for kind, node in enumerate(equations.nodes):
@@ -71,30 +73,67 @@ def _decide(
     equations: Equations, states: np.ndarray, values: Values, open_rows: Sequence[tuple[int, int, int]]
 ) -> None:
     """Set the modes of the rows on their surfaces by the forces on them, as codegen/driver/rows.py does after events."""
-    parts: dict[tuple[int, int], list[int]] = {}
+    undecided: dict[int, dict[int, list[int]]] = {}
     for cell, i, a in open_rows:
-        parts.setdefault((cell, i), []).append(a)
-    for i in sorted({i for _, i in parts}):
-        rows, places, names = equations.rows_at(i), equations.places[i], equations.state
-        symbols = tuple(sp.Symbol(name, real=True) for name in names)
-        held = [a for a, row in enumerate(rows) if row.law is not Law.RESET]
-        size = len(equations.node_at(i).continuous)
-        for (cell, _), undecided in ((key, each) for key, each in parts.items() if key[1] == i):
-            at: Values = {
-                s: column[cell] for s, column in values.items() if s.name in equations.parameters or s == TIME
-            }
-            at |= {s: states[cell, k : k + 1] for k, s in enumerate(symbols)}
-            rate, ratio = ([_at(getattr(rows[a], name), at, (1,))[0] for a in held] for name in ("rate", "ratio"))
-            stiffness = np.array([[_at(e, at, (1,))[0] for e in rows[a].stiffness] for a in held])
-            modes = np.array([states[cell, places[size + b]] for b in range(len(held))])
-            free = [held.index(a) for a in undecided]
-            stops = np.array([rows[a].law is Law.STOP for a in held])
-            best = _agreeing(np.array(rate), np.array(ratio), stiffness, stops, modes, free)
-            if best is None:
-                raise ValueError(
-                    f"initial: found no single motion of node {i + 1} that agrees with its contacts or surfaces; change the start"
-                )
-            states[cell, list(places[size:])] = best
+        undecided.setdefault(i, {}).setdefault(cell, []).append(a)
+    for i in sorted(undecided):
+        _decide_together(equations, states, values, equations.rows_at(i), undecided[i], f"node {i + 1}")
+
+
+def _decide_together(
+    equations: Equations,
+    states: np.ndarray,
+    values: Values,
+    rows: Sequence[Row],
+    undecided: Mapping[int, Sequence[int]],
+    where: str,
+) -> None:
+    """Set the modes of rows that are solved together; `undecided` (cell): the numbers of the rows on their surfaces."""
+    places = {sp.Symbol(name, real=True): k for k, name in enumerate(equations.state)}
+    held = [a for a, row in enumerate(rows) if row.law is not Law.RESET]
+    slots = [places[rows[a].mode] for a in held]
+    for cell, numbers in undecided.items():
+        at: Values = {s: column[cell] for s, column in values.items()}
+        at |= {s: states[cell, k : k + 1] for s, k in places.items()}
+        rate, ratio = ([_at(getattr(rows[a], name), at, (1,))[0] for a in held] for name in ("rate", "ratio"))
+        stiffness = np.array([[_at(e, at, (1,))[0] for e in rows[a].stiffness] for a in held])
+        free = [held.index(a) for a in numbers]
+        stops = np.array([rows[a].law is Law.STOP for a in held])
+        best = _agreeing(np.array(rate), np.array(ratio), stiffness, stops, states[cell, slots], free)
+        if best is None:
+            raise ValueError(
+                f"initial: found no single motion of {where} that agrees with its contacts or surfaces; change the start"
+            )
+        states[cell, slots] = best
+
+
+def _modes_of_parts(equations: Equations, states: np.ndarray, values: Values, slack: float) -> np.ndarray:
+    """Return initial states with the modes of rows of parts that links join."""
+    symbols = [sp.Symbol(name, real=True) for name in equations.state]
+    modes = [
+        k
+        for places, node in zip(equations.places, map(equations.node_at, range(equations.n)), strict=True)
+        for k in places[len(node.continuous) :]
+    ]
+    states[:, modes] = 1.0
+    columns = {s: c[:, 0] for s, c in values.items()}
+    for part in equations.parts:
+        rows, undecided = equations.rows_of(part), dict[int, list[int]]()
+        for a, row in enumerate(rows):
+            at = columns | {s: states[:, k] for k, s in enumerate(symbols)}
+            level, speed = (_at(e, at, (len(states),)) for e in (row.level, row.speed))
+            if row.law is not Law.RESET:
+                level, speed = (np.where(abs(e) <= slack, 0.0, e) for e in (level, speed))
+            _check_start(row, level[:, None], speed[:, None], [part.owners[a][0]])
+            if row.law is Law.SIGN:
+                states[:, symbols.index(row.mode)] = np.where(level == 0.0, 0.0, np.sign(level))
+            on = (level == 0.0) & (row.law is Law.SIGN or (speed == 0.0)) & (row.law is not Law.RESET)
+            for cell in np.flatnonzero(on):
+                undecided.setdefault(int(cell), []).append(a)
+        _decide_together(
+            equations, states, values, rows, undecided, f"nodes {', '.join(str(i + 1) for i in part.nodes)}"
+        )
+    return states
 
 
 def _agreeing(
