@@ -475,7 +475,8 @@ class Cycles:
     def birth(self, z: np.ndarray) -> BifurcationKind | None:
         """Return the bifurcation in which the cycles are born, if a branch point is one; None else."""
         away = np.abs(self.flow.rates(self.values(z), self.states(z)) / self.scale).max() * self.period(z)
-        if not self.periods and away < BORN:
+        # A circle of radius r has the speed 2 pi r / T; half a period later, its states differ by at most 2 r.
+        if not self.periods and away < 2.0 * np.pi * BORN:
             return BifurcationKind.HOPF
         # After half the time the motion is where it began: a cycle of half the period doubles it here.
         if self.periods % 2 or (self.segments > 1 and self.segments % 2):

@@ -6,6 +6,7 @@ The values of (F) were computed with SciPy's DOP853 at 2.5e-14 and variational e
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -234,6 +235,19 @@ def test_the_unstable_cycles_of_lorenz_are_born_at_its_hopf_point() -> None:
         assert orbit.period == pytest.approx(period, abs=2e-12)
         assert orbit.multipliers[0].real == pytest.approx(multiplier, abs=1e-9)
         assert not orbit.stable
+
+
+@pytest.mark.parametrize("radius", [1e-4, 3e-4, 5e-4])
+def test_small_circles_are_born_at_a_hopf_point(radius: float) -> None:
+    """Circles around (1, 1): half a period later, their states differ by 2 r, as at a period doubling (C)."""
+    inward = f"({radius}**2 - (x - 1)**2 - (y - 1)**2)"
+    node = sc.Field({"x": f"{inward}*(x - 1) - (y - 1)", "y": f"{inward}*(y - 1) + x - 1"})
+    circles = Cycles.near(sc.Scene(node), (), (0,), np.array([[1.0 + radius, 1.0]]), 2.0 * np.pi, 0)
+    circles = replace(circles, scale=np.ones(2))  # extent of the first orbit of the branch
+    z, gap, _ = circles.solved()
+    assert gap < 1e-10
+    assert circles.states(z)[0] == pytest.approx([1.0 + radius, 1.0], abs=radius / 10)
+    assert circles.birth(z) == "Hopf"
 
 
 LORENZ = sc.Field({"x": "10*(y - x)", "y": "x*(r - z) - y", "z": "x*y - 8*z/3"}, parameters={"r": 24})
