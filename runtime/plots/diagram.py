@@ -88,7 +88,10 @@ def _height(solution: Equilibrium | PeriodicOrbit, y: str | None) -> float:
     scene = solution.scene.replace(
         observe={"y": y}, record=(), transient=0.0, window=window, time_unit="time", continuation="none"
     )
-    return float(run(scene, start=solution.data.state, show_progress=False, workers=1).data["y"])
+    heights = run(scene, start=solution.data.state, show_progress=False, workers=1).data["y"].values
+    if heights.size != 1:
+        raise ValueError(f"y: found {y!r}, one value of each node; expected one, of node 1 (x_1) or nodes.maximum(x)")
+    return float(heights.item())
 
 
 def stretches(

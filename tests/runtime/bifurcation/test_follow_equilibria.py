@@ -284,6 +284,12 @@ def test_a_large_network_without_blocks_folds() -> None:
     assert not branch.stable.any()
 
 
+def test_a_value_of_each_node_is_no_height_of_a_diagram() -> None:
+    branch = sc.follow(sc.equilibrium(sc.Scene(CELL, PULL, sc.graphs.chain(2), initial={"x": 0})), "K", to=0.7)
+    with pytest.raises(ValueError, match=r"y: found 'maximum\(x\)', one value of each node; expected one"):
+        branch.plot(y="maximum(x)")
+
+
 def test_a_diagram_draws_observables_and_reads_as_its_branches(tmp_path: Path) -> None:
     cell = sc.Scene(sc.Field({"x": "r*x - x**3"}, parameters={"r": -1}), initial={"x": 0})
     rest = sc.follow(sc.equilibrium(cell), "r", to=1)
@@ -292,6 +298,8 @@ def test_a_diagram_draws_observables_and_reads_as_its_branches(tmp_path: Path) -
     assert [len(each) for each in both] == [len(rest), len(fork)]
     lines = [line for line in both.plot(y="maximum(x_1**2)").lines if len(line.get_xdata()) > 1]
     assert {line.get_linestyle() for line in lines} == {"-", "--"}
+    of_the_node = [line for line in both.plot(y="maximum(x**2)").lines if len(line.get_xdata()) > 1][-len(lines) :]
+    assert [list(line.get_ydata()) for line in of_the_node] == [list(line.get_ydata()) for line in lines]
     for line in lines:
         across, up = np.array(line.get_xdata()), np.array(line.get_ydata())
         np.testing.assert_allclose(up, 0.0 if not up.any() else across, atol=1e-9)
