@@ -63,7 +63,7 @@ assert difference < 1e-5
 # %%
 # Figure
 # ------
-# Dots are published zeros.  Grey curves have no zero.
+# Dots are the zeros above.  Grey curves have no zero.
 import matplotlib.pyplot as plt
 
 _, panels = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")

@@ -34,13 +34,13 @@ world = sc.graphs.from_edges([(a + 1, b + 1) for a, b in links])
 slow, fast = np.sort(np.abs(world.spectrum.values))[[1, -1]]
 rossler = sc.Field({"x": "-y - z", "y": "x + 0.2*y", "z": "0.2 + z*(x - 7)"}, initial={"x": 1, "y": 1, "z": 1})
 scene = sc.Scene(rossler, "x->x", world, time_unit="time", transient=400, window=20, rtol=1e-6)
-starts = {"ranges": {"x": (-15, 15), "y": (-15, 15), "z": (-5, 35)}, "samples": 250, "bound": 400}
+ranges = {"x": (-15, 15), "y": (-15, 15), "z": (-5, 35)}
 printed = {0.218: 0.496, 0.297: 0.694}
-basin = sc.basin(scene, sigma=[*printed], **starts)
+basin = sc.basin(scene, sigma=[*printed], samples=250, ranges=ranges, bound=400)
 bounded = 1 - basin.shares.sel(attractor="escaped").values
 claims = {"least eigenvalue": (1.236, slow, 5e-4), "largest eigenvalue": (13.87125, fast, 5e-6)}
 for (K, share), found in zip(printed.items(), bounded, strict=True):
-    error = np.sqrt(share * (1 - share) * (1 / 500 + 1 / starts["samples"]))
+    error = np.sqrt(share * (1 - share) * (1 / 500 + 1 / 250))
     claims[f"share of starts at K = {K}"] = share, found, 3 * error
 reproduction = sc.results.Reproduction(claims)
 print(reproduction)
