@@ -270,7 +270,7 @@ def march(functions, dims, owners, first, last, inputs, deviations, outputs, pro
     # 1. Workspace of the orbit.
     size, kinds, contact_size = dims.dimension, dims.strengths, dims.contacts
     lane_size, dense_size = CLOCK + 2 * size + dims.parameters + len(REPEATING), dims.dense_rows * size + dims.workspace
-    block = aligned(lane_size + 2 * size + dense_size + contact_size + dims.shared + size)
+    block = aligned(lane_size + 2 * size + dense_size + contact_size + dims.shared + size + dims.rows)
     clock, y, y_new = address(block, 0), address(block, CLOCK), address(block, lane_size)
     middle, dense = address(y_new, size), address(y_new, 2 * size)
     out = address(dense, dense_size)

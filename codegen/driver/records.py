@@ -79,7 +79,7 @@ class Orbit(NamedTuple):
     y_new: Any
     dense: Any
     shared: Any  # Jacobians of a step, or their series, for the modes
-    slips: Any  # modes of the contacts before an event; of rows, the state
+    slips: Any  # modes of the contacts before an event; of rows, the state, and 1 for a closed gap
     control: Any
     friction: Friction
 

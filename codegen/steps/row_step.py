@@ -97,8 +97,11 @@ def row_events(variation: Variation, events: Events, names: Names) -> list[Funct
     body += [let(s, register("strengths", len(strengths), k)) for k, s in enumerate(strengths) if real(s) in used]
     body += [let(s.name, register("modes", size, k)) for k, s in enumerate(events.deviations)]
     for number, jump in enumerate(events.jumps):
-        line = share(jump, names.fresh("z"))
-        stores = [store("modes", size * Name("which") + c, lower(e)) for c, e in enumerate(line.results)]
+        if jump == events.deviations:
+            continue
+        moved = [c for c, (e, d) in enumerate(zip(jump, events.deviations, strict=True)) if e != d]
+        line = share([jump[c] for c in moved], names.fresh("z"))
+        stores = [store("modes", size * Name("which") + c, lower(e)) for c, e in zip(moved, line.results, strict=True)]
         body.append(If(Compare("==", Name("row"), Number(number)), (*assigned(line), *stores)))
     about = "Change deviations by an event of a row; behind the last row: by a start on surfaces."
     arguments = ("row", "now", "before", "after", "strengths", "modes", "which")

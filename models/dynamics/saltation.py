@@ -23,7 +23,7 @@ import sympy as sp
 from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Edge
 from ..mechanics.contact import SLIP
-from ..mechanics.rows import Law, projection
+from ..mechanics.rows import Law, forces
 from .equations import Equations
 
 Entry = tuple[tuple[int, int], sp.Expr]
@@ -92,99 +92,102 @@ def _releases(orbit: Equations) -> tuple[tuple[_Release, _Release], ...]:
     return tuple(releases)
 
 
-def of_rows(orbit: Equations, links: Sequence[Sequence[sp.Matrix]]) -> Events:
-    """Return the events of the rows of one node, for deviations of which the links make the rates -sum links[b][c] d_c.
+def of_rows(
+    orbit: Equations,
+    owners: Sequence[int],
+    slots: Sequence[Sequence[int]],
+    pushes: Mapping[tuple[int, int], sp.Matrix],
+    names: Sequence[str] = (),
+) -> Events:
+    """Return the events of rows, for deviations in blocks: block k deviates from node `owners[k]`, in the rows `slots[k]`.
 
-    At an event of a gap h with the reset R the deviation becomes R_z d + (F+ - R_z F- - R_t) delta, with
+    `pushes`: what block j adds to the rates of block k while its node holds no row.  Deviations of the parameters `names`
+    follow the blocks.  At an event of a gap h with the reset R a deviation becomes R_z d + (F+ - R_z F- - R_t) delta, with
     delta = n d/(n F- + dh/dt) and n the gradient of h (Leine & Nijmeijer, chapter 7).
     """
-    size, symbols = len(orbit.node.continuous), orbit.symbols(0)
-    z, after = symbols[:size], tuple(sp.Symbol(f"{s.name}_then", real=True) for s in symbols)
-    then = dict(zip(symbols, after, strict=True))
-    rates = [e.xreplace(orbit.at_node(0)) for e in orbit.node.rhs[:size]]
-    d = sp.symbols(f"deviation_:{size * len(links)}", real=True)
-    parts = [sp.Matrix(d[b * size : (b + 1) * size]) for b in range(len(links))]
-    added = [-sum((link * part for link, part in zip(row, parts, strict=True)), sp.zeros(size, 1)) for row in links]
+    size = sum(map(len, slots))
+    deviations = sp.symbols(f"deviation_:{size + len(names)}", real=True)
+    blocks = [sp.Matrix([deviations[c] for c in slot]) for slot in slots]
+    by_names = list(zip((sp.Symbol(name, real=True) for name in names), deviations[size:], strict=True))
+    added = [sp.zeros(len(block), 1) for block in blocks]
+    for (k, j), push in pushes.items():
+        added[k] += push * blocks[j]
+    rates = dict(zip((sp.Symbol(name, real=True) for name in orbit.state), orbit.rhs(), strict=True))
+    after = [sp.Symbol(f"{name}_then", real=True) for name in orbit.state]
 
-    def gradient(e: sp.Expr) -> sp.Matrix:
-        return sp.Matrix([[derivative(e, s) for s in z]])
+    def change(e: sp.Expr, along: Iterable[tuple[sp.Symbol, sp.Expr]]) -> sp.Expr:
+        return sp.Add(*(derivative(e, s) * moved for s, moved in along))
 
-    jumps, rows = [], orbit.rows_at(0)
-    held = [row for row in rows if row.law is not Law.RESET]
-    for row in rows:
-        mode, reset = row.mode, list(z)
-        # the gap that closes: off the surface the level, on it the distance of the force x from its limit
-        if row.law is Law.RESET:
-            reset, n, n_t, turned = (
-                [dict(row.sets).get(s, s) for s in z],
-                gradient(row.level),
-                derivative(row.level, TIME),
-                sp.S.Zero,
-            )
-        else:
-            limit = row.ratio if row.law is Law.SIGN else sp.S.Zero
-            side, off = (then[mode], mode**2) if row.law is Law.SIGN else (-sp.S.One, mode)
-            n = off * gradient(row.level) + (1 - off) * (gradient(limit) - side * gradient(row.x))
-            n_t = off * derivative(row.level, TIME) + (1 - off) * (
-                derivative(limit, TIME) - side * derivative(row.x, TIME)
-            )
-            turned = -(1 - off) * side
-        if row.law is Law.STOP:
-            # a stop that is closed after the impact has not rebounded
-            kick = mode * (1 + row.ratio * then[mode]) * row.speed / row.stiffness[held.index(row)]
-            reset = [s + push * kick for s, push in zip(z, row.push, strict=True)]
-        slopes = sp.Matrix([gradient(e) for e in reset])
-        first, last = sp.Matrix(rates), sp.Matrix([e.xreplace(then) for e in rates])
-        gained = last - slopes * first - sp.Matrix([derivative(e, TIME) for e in reset])
-        passing = (n * first)[0] + n_t
-        answer = sp.Matrix([row.answer])
-        jump: list[sp.Expr] = []
-        for part, more in zip(parts, added, strict=True):
-            lead = ((n * part)[0] + turned * (answer * more)[0]) / passing
-            jump += list(slopes * part + gained * lead)
-        jumps.append(tuple(jump))
-
-    # a start with held rows: deviations along the surfaces alone
-    flat: list[sp.Expr] = []
-    for part in parts:
-        moved = list(projection(rows, list(part)))
-        for row in held:
+    jumps, start = [], list(deviations)
+    for i in sorted(range(orbit.n), key=orbit.kind_of.__getitem__):  # the order of rows in a kernel
+        rows, symbols = orbit.rows_at(i), orbit.symbols(i)
+        z = symbols[: len(orbit.node_at(i).continuous)]
+        then = dict(zip(symbols, (after[k] for k in orbit.places[i]), strict=True))
+        held = [row for row in rows if row.law is not Law.RESET]
+        own = [k for k, owner in enumerate(owners) if owner == i]
+        along = {k: [*zip(z, blocks[k], strict=True), *by_names] for k in own}
+        for row in rows:
+            # the gap that closes: off the surface the level, on it the distance of the force x from its limit
+            mode, gap, turned, reset = row.mode, row.level, sp.S.Zero, list(z)
+            if row.law is Law.RESET:
+                reset = [dict(row.sets).get(s, s) for s in z]
+            else:
+                limit = row.ratio if row.law is Law.SIGN else sp.S.Zero
+                side, off = (then[mode], mode**2) if row.law is Law.SIGN else (-sp.S.One, mode)
+                gap, turned = off * row.level + (1 - off) * (limit - side * row.x), -(1 - off) * side
             if row.law is Law.STOP:
-                depth = (1 - row.mode) * (gradient(row.level) * part)[0] / row.stiffness[held.index(row)]
-                moved = [e - lift * depth for e, lift in zip(moved, row.lift, strict=True)]
-        flat += moved
-    return Events((-1,) * len(d), (), (*jumps, tuple(flat)), after, d)
+                # a stop that is closed after the impact has not rebounded
+                kick = mode * (1 + row.ratio * then[mode]) * row.speed / row.stiffness[held.index(row)]
+                reset = [s + push * kick for s, push in zip(z, row.push, strict=True)]
+            motion = [(s, rates[s]) for s in rates if s in gap.free_symbols and rates[s] != 0]
+            passing = change(gap, motion) + derivative(gap, TIME)
+            jump = list(deviations)
+            for k in own:
+                by_links = sp.Add(*(a * e for a, e in zip(row.answer, added[k], strict=True)))
+                lead = (change(gap, along[k]) + turned * by_links) / passing
+                for c, s, e in zip(slots[k], z, reset, strict=True):
+                    gained = rates[s].xreplace(then) - change(e, [(s, rates[s]) for s in z]) - derivative(e, TIME)
+                    jump[c] = change(e, along[k]) + gained * lead
+            jumps.append(tuple(jump))
+
+        # a start with held rows: deviations along the surfaces alone
+        for k in own if held else ():
+            kicks = forces(
+                [Law.STOP] * len(held),
+                [row.mode for row in held],
+                [row.stiffness for row in held],
+                [change(row.speed, along[k]) for row in held],
+            )
+            moved = list(blocks[k])
+            for a, (row, kick) in enumerate(zip(held, kicks, strict=True)):
+                moved = [e + push * kick for e, push in zip(moved, row.push, strict=True)]
+                if row.law is Law.STOP:
+                    depth = (1 - row.mode) * change(row.level, along[k]) / row.stiffness[a]
+                    moved = [e - lift * depth for e, lift in zip(moved, row.lift, strict=True)]
+            for c, e in zip(slots[k], moved, strict=True):
+                start[c] = e
+    return Events((-1,) * len(deviations), (), (*jumps, tuple(start)), tuple(after), deviations)
 
 
 def check_links_of_events(equations: Equations) -> None:
     """Raise ValueError for links with the states that a row changes at once: the order of equal events then matters."""
     if not equations.has_rows:
         return
-    node = equations.node
-    changed = {
-        k
-        for row in node.rows
-        for k in range(len(node.continuous))
-        if (row.law is not Law.SIGN or row.ratio != 1) and (row.push[k] != 0 or node.state[k] in dict(row.sets))
-    }
-    off = {mode: sp.S.One for edge in equations.edges for mode in edge.here[len(node.continuous) :]}
-    for edge in equations.edges:
-        for e in (each.xreplace(off) for each in edge.rhs):
-            if any(e.has(edge.there[k]) for k in changed):
-                raise ValueError(
-                    f"tangent dynamics: found links of {', '.join(str(node.state[k]) for k in sorted(changed))}, which events "
-                    "change at once, so the order of simultaneous events matters; expected links of states that no event changes"
-                )
-
-
-def check_tangents(equations: Equations) -> None:
-    """Raise ValueError for networks of several nodes with rows, whose saltation matrices are not supported."""
-    if equations.has_rows and equations.n > 1:
-        raise ValueError(
-            "tangent dynamics of a network: found contacts of several coordinates, moving grounds or kinds, stops, resets or "
-            "surfaces; expected one node, or friction of one coordinate on a ground of constant velocity; take "
-            "scene.lone, or modes of the synchronous motion by msf or exponents"
-        )
+    for (target, source), edge in equations.edge_of:
+        node, here = equations.nodes[source], len(equations.nodes[target].continuous)
+        changed = [
+            k
+            for k, s in enumerate(node.continuous)
+            for row in node.rows
+            if (row.law is not Law.SIGN or row.ratio != 1) and (row.push[k] != 0 or s in dict(row.sets))
+        ]
+        off = dict.fromkeys(edge.here[here:], sp.S.One)
+        if any(e.xreplace(off).has(edge.there[k]) for e in edge.rhs for k in changed):
+            raise ValueError(
+                f"tangent dynamics: found links of {', '.join(dict.fromkeys(str(node.state[k]) for k in changed))}, which "
+                "events change at once, so the order of simultaneous events matters; expected links of states that no event "
+                "changes"
+            )
 
 
 def _check_springs(edges: Iterable[Edge]) -> None:
@@ -220,7 +223,9 @@ def of_mode(
     if not orbit.sticks:
         return None
     if orbit.has_rows:
-        return of_rows(orbit, links)
+        blocks, size = range(len(links)), len(orbit.node.continuous)
+        pushes = {(k, j): -link for k, row in enumerate(links) for j, link in enumerate(row)}
+        return of_rows(orbit, [0 for _ in blocks], [range(b * size, (b + 1) * size) for b in blocks], pushes)
     releases = _releases(orbit)
     if releases:
         _check_springs(equations.edges)
@@ -246,9 +251,10 @@ def of_network(equations: Equations, names: Sequence[str] = ()) -> Events | None
     n = equations.n
     if not equations.sticks:
         return None
-    check_tangents(equations)
     if equations.has_rows:
-        return of_rows(equations, [[sp.zeros(len(equations.node.continuous))]])
+        check_links_of_events(equations)
+        slots = [places[: len(equations.node.continuous)] for places in equations.places]
+        return of_rows(equations, range(n), slots, _pushes(equations), names)
 
     def entries(i: int, side: _Release) -> tuple[Entry, ...]:
         slopes = (*((j, g) for j, g in enumerate(side.gradient)), *((2 * n + k, g) for k, g in by_names(side.limit)))
@@ -259,6 +265,18 @@ def of_network(equations: Equations, names: Sequence[str] = ()) -> Events | None
 
     exits = tuple((entries(i, up), entries(i, down)) for i, (up, down) in enumerate(_releases(equations)))
     return Events((*[-1] * n, *range(n), *[-1] * len(names)), exits)
+
+
+def _pushes(equations: Equations) -> dict[tuple[int, int], sp.Matrix]:
+    """Return for each pair of linked nodes what a deviation of the second adds to the rates of the first, if no row holds."""
+    pushes: dict[tuple[int, int], sp.Matrix] = {}
+    for link, edge in equations.linked():
+        (i, j), values = link[:2], equations.at_link(link, edge)
+        rows, columns = (len(equations.node_at(end).continuous) for end in (i, j))
+        off = dict.fromkeys(edge.here[rows:], sp.S.One)
+        slope = sp.Matrix(edge.jacobian_there())[:rows, :columns].xreplace(off).xreplace(values)
+        pushes[i, j] = pushes.get((i, j), sp.zeros(rows, columns)) + slope
+    return pushes
 
 
 def of_slots(
@@ -275,10 +293,9 @@ def of_slots(
     if not orbit.sticks:
         return None
     if orbit.has_rows:
-        raise ValueError(
-            "cluster states: found contacts of several coordinates, moving grounds or kinds, stops, resets or surfaces; "
-            "expected friction of one coordinate on a ground of constant velocity"
-        )
+        check_links_of_events(equations)
+        held = {mode: sp.S.One for c in range(orbit.n) for mode in orbit.symbols(c)[len(orbit.node_at(c).continuous) :]}
+        return of_rows(orbit, slot_clusters, rows, {key: push.xreplace(held) for key, push in pushes.items()})
     releases = _releases(orbit)
     if releases:
         _check_springs(equations.edges)

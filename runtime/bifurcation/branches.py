@@ -163,6 +163,11 @@ def follow(
     solution = first.solution if isinstance(first, Bifurcation) else first
     scene = solution.scene
     _check_name(scene, name)
+    if scene.equations.has_rows and not isinstance(first, Equilibrium):
+        raise ValueError(
+            "follow: found stops, resets, surfaces, several contacts or moving grounds; expected friction of one coordinate on "
+            "a ground of constant velocity; find single orbits with periodic_orbit"
+        )
     bounds, requested = _bounds(scene, name, to, values, within)
     begin = scene.parameters[name]
     # The range of the parameter is its unit of length.

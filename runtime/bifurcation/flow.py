@@ -88,11 +88,6 @@ def flow_of(scene: Scene, equations: Equations, names: Sequence[str], state: np.
     """
     present = tuple(name for name in names if name in equations.parameters)
     if equations.sticks:
-        if equations.has_rows and names:
-            raise ValueError(
-                "follow: found stops, resets, surfaces, several contacts or moving grounds; expected friction of one coordinate on "
-                "a ground of constant velocity; find single orbits with periodic_orbit"
-            )
         return ContactFlow(scene, equations, present, tuple(names), equations.n * len(equations.node.continuous))
     lift, job = _job(scene.replace(rtol=TOLERANCE, atol=None), equations, present, tuple(map(float, state)))
     return LiftedFlow(equations, lift, job, present, tuple(names), equations.dimension, _linearised(equations))
@@ -312,7 +307,8 @@ class ContactFlow:
         (m, n), q = states.shape, len(self.present)
         integrator = self._integrator(values, self._with_slips(values, states))
         columns = np.eye(n + q)
-        if q:  # velocities relative to the ground
+        relative = q > 0 and not self.equations.has_rows
+        if relative:  # velocities relative to the ground
             grounds = _ground_slopes(self.equations, self.present)(*integrator.parameter_values[0])
             columns[n // 2 : n, n:] -= grounds
         integrator.control[Control.ATOL] = LEAST * TOLERANCE * float(scale[scale > 0.0].min(initial=1.0))
@@ -321,7 +317,7 @@ class ContactFlow:
         growth = integrator.advance(times)
         with np.errstate(all="ignore"):  # over a long transient deviations leave the range of numbers
             matrices = integrator.deviations * (np.exp(growth) * lengths)[:, None, :]
-        if q:
+        if relative:
             matrices[:, n // 2 : n, n:] += grounds
         self.steps = float(times.sum() / max(1, integrator.steps))
         moved = np.zeros((m, n, len(self.names)))

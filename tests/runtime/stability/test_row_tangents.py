@@ -11,6 +11,7 @@ import pytest
 import sympy as sp
 
 import synchain as sc
+from synchain.runtime.bifurcation.flow import flow_of
 
 X, V, T, TH, OM = sp.symbols("x v t th om")
 R = sp.Rational
@@ -127,10 +128,87 @@ def test_links_of_states_that_an_impact_changes_are_refused(coupling: str) -> No
         sc.exponents(ring(IMPACT, coupling, x=0.4, v=-0.5), [0.3])
 
 
-def test_networks_of_several_nodes_are_refused() -> None:
-    with pytest.raises(ValueError, match="tangent dynamics of a network: found contacts of several coordinates"):
-        sc.lyapunov_spectrum(ring(IMPACT, "spring", x=0.4, v=-0.5))
+def chain(node, coupling, **initial: list[float]) -> sc.Scene:
+    return sc.Scene(node, coupling, sc.graphs.chain(2), initial=initial, parameters={"sigma": 0.15}, **FINE)
+
+
+def test_multipliers_of_a_network_are_those_of_its_modes() -> None:
+    """Two oscillators that hit their stops at one instant: the modes 0 and 2 sigma = 0.3 of the springs."""
+    orbit = sc.periodic_orbit(chain(IMPACT, "spring", x=[0.4, 0.4], v=[-0.5, -0.5]), 1, clusters=(0, 1))
+    pairs = np.array([-0.07497024465844425 + 0.4666788456971145j, 0.3911885970952671 + 0.2652944856343134j])
+    found = orbit.multipliers[np.argsort(orbit.multipliers.real)]
+    assert np.abs(found.real - pairs.real.repeat(2)).max() < 1e-11
+    assert np.abs(abs(found.imag) - pairs.imag.repeat(2)).max() < 1e-11
     with pytest.raises(ValueError, match="derivative of a network: found stops"):
         sc.lyapunov_spectrum(
             ring(IMPACT, "spring", x=0.4, v=-0.5).replace(topology=sc.graphs.ring(9), initial={"x": [0.4] * 9})
         )
+
+
+def test_exponents_of_a_cluster_state_of_impact_oscillators() -> None:
+    """The orbit of the clusters is the synchronous one: its only block is the mode alpha = 0.15, a complex pair."""
+    start = {"x": [0.4] * 3, "v": [-0.5] * 3}
+    star = sc.Scene(IMPACT, "spring", sc.graphs.star(3), initial=start, parameters={"sigma": 0.15}, **FINE)
+    found = sc.cluster_exponents(star, [0, 1, 1], periods=100, transient=20)
+    assert found.exponent == pytest.approx([-0.095413264323899], abs=1e-3)
+
+
+A, B, C, S = sp.symbols("a b c s")
+SHAKEN = sc.Lagrangian(
+    V**2 / 2,
+    X**2 / 2,
+    {X: A * sp.cos(R(4, 5) * T) - V / 10},
+    coordinates={X: V},
+    parameters={A: 0.5, B: 0.6, C: 0.7},
+    events=[sc.Stop(B - X, C)],
+)
+DROP = sc.Lagrangian(
+    V**2 / 2,
+    X**2 / 2,
+    {X: A * sc.friction(B - V)},
+    coordinates={X: V},
+    parameters={A: 0.6, B: 0.3},
+    friction=sc.friction_law("sign(w)", static=C, parameters={C: 1.2}),
+    contact="set-valued",
+    events=[sc.Stop(R(4, 5) - X, R(1, 2))],
+)
+RELAY = sc.Field(
+    {X: V, V: -sp.sign(X + C * V - B) + A * sp.cos(T)}, contact="set-valued", parameters={A: 0.1, B: 0.1, C: 0.7}
+)
+CELL = sc.Field({V: A + sp.sin(T) / 3 - V}, events=[sc.Reset(V - B, {V: C})], parameters={A: 1.8, B: 1.0, C: 0.1})
+
+
+@pytest.mark.parametrize(
+    ("node", "coupling", "start", "time"),
+    [
+        (SHAKEN, "spring", [0.2, -0.1, 0.3, 0.2], 11.0),
+        (DROP, "spring", [0.3, -0.2, 0.2, 0.1], 7.0),
+        (RELAY, "v->v", [0.1, 0.7, 0.0, 0.3], 3.0),  # the first one begins on its surface
+        (CELL, None, [0.3], 7.0),
+    ],
+)
+def test_derivatives_of_a_network_through_events(node, coupling, start: list[float], time: float) -> None:
+    """By the start and by parameters, beside differences of the motion; no two events at one instant."""
+    names = ("a", "b", "c", *(["sigma"] if coupling else []))
+    size, state = len(start), np.array(start)
+    n = 2 if coupling else 1
+    initial = {s: start[k * n : k * n + n] for k, s in enumerate(("x", "v") if coupling else ("v",))}
+    scene = (
+        chain(node, coupling, **initial)
+        if coupling
+        else sc.Scene(node, None, sc.graphs.chain(1), initial=initial, **FINE)
+    )
+    flow, length = flow_of(scene, scene.equations, names, state), np.array([time])
+    image, step = flow.linearise(scene.parameters, state[None], length, np.ones(size)), 1e-6
+
+    def difference(name: str | None, direction: np.ndarray) -> np.ndarray:
+        ends = []
+        for h in (step, -step):
+            values = {**scene.parameters, **({name: scene.parameters[name] + h} if name else {})}
+            ends.append(flow.advance(values, (state + h * direction)[None], length)[0])
+        return (ends[0] - ends[1]) / (2 * step)
+
+    for k, name in enumerate(names):
+        assert image.columns[0][:, k] == pytest.approx(difference(name, np.zeros(size)), abs=1e-7)
+    for k, direction in enumerate(np.eye(size)):
+        assert image.propagators[0][:, k] == pytest.approx(difference(None, direction), abs=1e-7)
