@@ -17,7 +17,7 @@ Continuation Methods (SIAM, 2003), chapter 6.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,6 +73,10 @@ class Point:
     def value(self) -> float:
         """The parameter."""
         return float(self.z[-1])
+
+
+Test = Callable[[Point], float]
+"""A function along a branch or curve, which is zero at a bifurcation or a point of codimension two."""
 
 
 class BorderedFactors:
@@ -162,8 +166,8 @@ Events = Callable[[BranchProblem, Point, Point, float], "list[tuple[float, objec
 """Bifurcations on a step (problem, before, after, length), each with its length from `before`; None: halve the step."""
 
 
-def walk(problem: BranchProblem, first: Point, limits: Limits, events: Events) -> Generator[object, None, str]:
-    """Yield solutions and bifurcations along a branch from a first solution; returns how the branch ends.
+def walk(problem: BranchProblem, first: Point, limits: Limits, events: Events) -> Iterator[object]:
+    """Yield solutions and bifurcations along a branch from a first solution, and at last how the branch ends, a str.
 
     A bifurcation is what `events` returns. Nothing is looked for on the first step if `first` has no critical values.
     """
@@ -171,7 +175,8 @@ def walk(problem: BranchProblem, first: Point, limits: Limits, events: Events) -
     for _ in range(limits.most):
         found = _advance(problem, before, min(step, limits.largest_step), limits, events)
         if found is None:
-            return f"lost at {problem.names[-1]} = {before.value:.8g}"
+            yield f"lost at {problem.names[-1]} = {before.value:.8g}"
+            return
         after, located, length, end = found
         # Solutions at requested values and bifurcations in the order of their distance.
         extra = [(h, point) for h, point in _at_values(problem, before, after, length, limits)]
@@ -181,10 +186,11 @@ def walk(problem: BranchProblem, first: Point, limits: Limits, events: Events) -
         before = Point(z, tangent, after.corrections, after.critical, after.length)
         yield before
         if end:
-            return end
+            yield end
+            return
         few, many = after.corrections <= FEW, after.corrections > MANY
         step = length * (LONGER if few else SHORTER if many else 1.0)
-    return f"{limits.most} solutions"
+    yield f"{limits.most} solutions"
 
 
 def _advance(

@@ -93,7 +93,8 @@ def follow(
     first : Equilibrium, PeriodicOrbit or Bifurcation
         Where the branch begins.  From a branch point the other branch is followed, from a fold both sides.
     name : str or (str, str)
-        Name of the parameter; names of two parameters for a curve of folds or Hopf points of equilibria.
+        Name of the parameter; names of two parameters for a curve of folds or Hopf points of equilibria, of folds, period
+        doublings or torus points of cycles, or of places where cycles lose synchrony.
     to : float, optional
         Follow from the value of `first` towards this one and end there, or where the branch returns to its beginning.
     values : array_like, shape (k,), optional
@@ -155,7 +156,7 @@ def follow(
     if not isinstance(name, str):
         if not isinstance(first, Bifurcation) or not isinstance(within, Mapping | None):
             raise ValueError(
-                "follow: found two parameters; expected a fold or Hopf point, and within={name: (low, high)} for a curve"
+                "follow: found two parameters; expected a bifurcation, and within={name: (low, high)} for a curve"
             )
         return follow_curve(first, name, within, SIGNS[direction], largest_step)
     if isinstance(within, Mapping):
@@ -274,19 +275,9 @@ def _trace(problem: Equilibria | Cycles, start: Point, limits: Limits) -> Part:
     events = cycle_bifurcations if isinstance(problem, Cycles) else bifurcations
     if isinstance(problem, Cycles) and problem.flow.equations.sticks and problem.flow.equations.n == 1:
         corners = Corners(problem)
-    steps = walk(problem, start, limits, corners or events)
     points: list[tuple[Point, Equilibrium | PeriodicOrbit]] = [(start, problem.solution(start))]
     found: list[Bifurcation] = []
-    while True:
-        try:
-            each = next(steps)
-        except StopIteration as ended:
-            end = str(ended.value)
-            corner = corners.at_end([point for point, _ in points]) if corners and end.startswith("lost") else None
-            if corner is not None:
-                found.append(_corner(problem, corner))
-                end = f"grazing at {problem.names[-1]} = {corner.point.value:.8g}"
-            return points, found, end
+    for each in walk(problem, start, limits, corners or events):
         if isinstance(each, Point):
             points.append((each, problem.solution(each)))
         elif isinstance(each, Corner):
@@ -296,6 +287,12 @@ def _trace(problem: Equilibria | Cycles, start: Point, limits: Limits) -> Part:
             if found[-1].kind in BORN and each.kind is BifurcationKind.BRANCH_POINT:
                 # The branch is born there; beyond it are the same cycles, shifted in time.
                 return points, found, f"{found[-1].kind} at {problem.names[-1]} = {each.point.value:.8g}"
+    end = str(each)
+    corner = corners.at_end([point for point, _ in points]) if corners and end.startswith("lost") else None
+    if corner is not None:
+        found.append(_corner(problem, corner))
+        end = f"grazing at {problem.names[-1]} = {corner.point.value:.8g}"
+    return points, found, end
 
 
 def _corner(problem: Equilibria | Cycles, corner: Corner) -> Bifurcation:

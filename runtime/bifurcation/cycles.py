@@ -82,7 +82,7 @@ REAL = 1e-7
 
 @dataclass(slots=True)
 class Cycles:
-    """Periodic orbits of a network, or of its quotient by clusters; the last unknown is the parameter `names[0]`."""
+    """Periodic orbits of a network, or of its quotient by clusters; the last unknowns are the parameters `names`."""
 
     scene: Scene  # the network
     names: tuple[str, ...]
@@ -93,7 +93,7 @@ class Cycles:
     shifts: np.ndarray  # (n, k): directions in which all rates are the same
     point: np.ndarray
     scale: np.ndarray  # (n,): extent of each state
-    span: float  # the unit of the parameter
+    spans: np.ndarray  # (q,): the unit of each parameter
     phase: np.ndarray  # (m, n): the direction of the motion at the reference; the unknowns move across it
     transversal: Transversal | None = None
     speed: float = math.nan  # size of the rates where the extents were measured
@@ -128,10 +128,10 @@ class Cycles:
         size, values = flow.size, scene.parameters
         numbers = [values[name] for name in names]
         point = np.concatenate([states.ravel(), [] if drive_periods else [period], numbers])
-        span = abs(numbers[-1]) if numbers and numbers[-1] else 1.0
+        spans = np.array([abs(number) or 1.0 for number in numbers])
         problem = cls(
             scene, tuple(names), tuple(classes), flow, drive_periods, np.zeros(size), np.zeros((size, 0)), point,
-            np.ones(size), span, np.zeros_like(states), Transversal.of(scene, tuple(classes)),
+            np.ones(size), spans, np.zeros_like(states), Transversal.of(scene, tuple(classes)),
         )  # fmt: skip
         problem.turns = problem._whole_turns(states, period)
         problem._rescale(point)
@@ -194,11 +194,11 @@ class Cycles:
         states = np.tile(1.0 / (self.scale * math.sqrt(m * n)), m)
         shifts = np.full(self.shifts.shape[1], 1.0 / float(self.scale.max()))
         period = [] if self.periods else [1.0 / self.point[-1 - len(self.names)]]
-        return np.concatenate([states, shifts, period, np.full(len(self.names), 1.0 / self.span)])
+        return np.concatenate([states, shifts, period, 1.0 / self.spans])
 
     def set_ranges(self, ranges: np.ndarray) -> None:
-        """Set the lengths by which parameters are measured."""
-        self.span = float(ranges[-1])
+        """Measure parameters by the lengths of their ranges; one without bounds, inf, by its value."""
+        self.spans = np.where(np.isfinite(ranges), ranges, self.spans)
 
     def states(self, z: np.ndarray) -> np.ndarray:
         """Return the states (m, n) at the beginning of the segments."""
@@ -222,31 +222,27 @@ class Cycles:
             self.driven = numbers, self.periods * float(periods(self.scene.equations, np.array([numbers]))[0])
         return self.driven[1]
 
-    def _period_slope(self, values: Mapping[str, float]) -> float:
-        """Return the derivative of the drive's period by the parameter."""
-        slope = _frequency_slope(self.scene.equations, self.names[-1]) if self.names else None
-        if slope is None:
-            return 0.0
+    def period_slopes(self, values: Mapping[str, float]) -> np.ndarray:
+        """Return the derivatives (q,) of the drive's period by the parameters; 0 without a drive."""
+        slopes = [_frequency_slope(self.scene.equations, name) if self.periods else None for name in self.names]
         numbers = [values[name] for name in self.scene.equations.parameters]
-        return -self._drive_period(values) * float(slope(*numbers))
+        return np.array([0.0 if s is None else -self._drive_period(values) * float(s(*numbers)) for s in slopes])
 
     # --- equations ---
     def linearise(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the gaps of all segments and the conditions, with their derivatives."""
         (m, n), shifts = self.phase.shape, self.shifts.shape[1]
         image, rates = self._image(z)
-        values, states = self.values(z), self.states(z)
-        residual, matrix = np.zeros(len(z) - len(self.names)), np.zeros((len(z) - len(self.names), len(z)))
+        states, slopes, tail = self.states(z), self.period_slopes(self.values(z)), len(z) - len(self.names)
+        residual, matrix = np.zeros(tail), np.zeros((tail, len(z)))
         for i in range(m):
             rows, following = slice(i * n, i * n + n), (i + 1) % m
             residual[rows] = image.states[i] - states[following]
             matrix[rows, rows] += image.propagators[i]
             matrix[rows, following * n : following * n + n] -= np.eye(n)
-            matrix[rows, len(z) - len(self.names) :] = image.columns[i]
+            matrix[rows, tail:] = image.columns[i] + np.outer(rates[i], slopes / m)
             if not self.periods:
                 matrix[rows, m * n + shifts] = rates[i] / m
-            elif (slope := self._period_slope(values)) != 0.0:
-                matrix[rows, -1] += rates[i] * slope / m
         residual[m * n - n : m * n] -= self.turns + self.shifts @ z[m * n : m * n + shifts]
         matrix[m * n - n : m * n, m * n : m * n + shifts] = -self.shifts
         # The conditions: across the motion, and across each shift at the first state.
@@ -309,12 +305,13 @@ class Cycles:
         """Divide each segment into `factor`; the tangent at the new states follows the flow."""
         states, ahead, m = [self.states(z)], [self.states(tangent)], self.segments
         values, part = self.values(z), self.period(z) / (m * factor)
-        along = self._period_slope(values) * tangent[-1] if self.periods else tangent[-1 - len(self.names)]
+        by = tangent[len(z) - len(self.names) :]
+        along = float(self.period_slopes(values) @ by) if self.periods else tangent[-1 - len(by)]
         for _ in range(factor - 1):
             image = self.flow.linearise(values, states[-1], np.full(m, part), self.scale)
             rates = self.flow.rates(values, image.states)
             moved = np.einsum("mij,mj->mi", image.propagators, ahead[-1])
-            moved += image.columns @ tangent[len(z) - len(self.names) :] + rates * along / (m * factor)
+            moved += image.columns @ by + rates * along / (m * factor)
             states.append(image.states)
             ahead.append(moved)
         parts = [np.stack(each, axis=1).ravel() for each in (states, ahead)]

@@ -30,6 +30,13 @@ class GrowthNumbers(NamedTuple):
         order = np.lexsort((-values.imag, np.abs(values.imag), -growth))
         return cls(growth[order], values[order], blocks[order])
 
+    def without(self, values: list[complex]) -> GrowthNumbers:
+        """Leave out the number that is nearest to each value."""
+        kept = np.arange(len(self.values))
+        for value in values:
+            kept = np.delete(kept, np.abs(self.values[kept] - value).argmin())
+        return GrowthNumbers(self.growth[kept], self.values[kept], self.blocks[kept])
+
     @property
     def scale(self) -> float:
         """Largest modulus of the values, the unit of their rounding errors."""

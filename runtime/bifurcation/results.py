@@ -393,10 +393,10 @@ def diagram(*branches: Branch | Diagram) -> Diagram:
 class CurvePoint:
     """A point of codimension two on a curve, or one at which a parameter is extreme."""
 
-    kind: str  # "cusp", "Bogdanov-Takens", "Bautin", "zero-Hopf", "double Hopf"; "extreme p"
+    kind: str  # "cusp", "Bogdanov-Takens", "Bautin", "zero-Hopf", "double Hopf", "1:3 resonance"; "extreme p"
     values: tuple[float, float]  # of both parameters
     state: np.ndarray  # (states,)
-    frequency: float = 0.0  # of a Hopf point
+    frequency: float = 0.0  # of a Hopf or torus point
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -414,15 +414,17 @@ class Curve(Labelled):
     values : ndarray, shape (k, 2)
         Their values along the curve.
     states : ndarray, shape (k, states)
-        Equilibria along the curve.
+        Equilibria along the curve, or states of the cycles at the beginning of a period.
     frequencies : ndarray, shape (k,)
-        Angular frequencies of Hopf points; 0 on curves of folds.
+        Angular frequencies of Hopf points; of torus points those of the second oscillation; 0 on other curves.
     growing : ndarray of int, shape (k,)
         Number of growing eigenvalues beside the critical ones.
     special : tuple of CurvePoint
         Points of codimension two and extremes of a parameter, in the order of the curve.
     ends : tuple of str
         Why the curve ends on both sides.
+    periods : ndarray, shape (k,)
+        Periods of cycles; 0 of equilibria.
 
     See Also
     --------
@@ -438,6 +440,7 @@ class Curve(Labelled):
     growing: np.ndarray
     special: tuple[CurvePoint, ...]
     ends: tuple[str, ...] = ()
+    periods: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __len__(self) -> int:
         return len(self.values)
@@ -454,9 +457,9 @@ class Curve(Labelled):
         columns = States.of(self.scene)
         return dataset(
             {
-                "state": (("point", *STATE), columns.table(self.states), "state at rest"),
-                "frequency": (("point",), self.frequencies, "angular frequency of Hopf points"),
-                "growing": (("point",), self.growing, "number of growing eigenvalues beside the critical ones"),
+                "state": (("point", *STATE), columns.table(self.states), "state at rest, or at the start of a period"),
+                "frequency": (("point",), self.frequencies, "angular frequency of Hopf or torus points"),
+                "growing": (("point",), self.growing, "number of growing values beside the critical ones"),
             },
             {
                 **{name: (("point",), self.values[:, k]) for k, name in enumerate(self.names)},
@@ -472,7 +475,7 @@ class Curve(Labelled):
         special = "; ".join(f"{each.kind} at {digits_of(each.values)}" for each in self.special)
         return (
             ("scene", scene_text(self.scene)),
-            ("curve", f"of {self.kind} points, {len(self)} solutions"),
+            ("curve", f"of {str(self.kind).removesuffix(' point')} points, {len(self)} solutions"),
             *((name, range_text(self.values[:, k])) for k, name in enumerate(self.names)),
             ("points", special or "none"),
             ("ends", "; ".join(self.ends)),

@@ -1,0 +1,335 @@
+"""Curves of folds, period doublings and torus points of cycles in two parameters, as problems that `arclength` follows.
+
+With y the unknowns of a cycle (states x_1 … x_m of m segments, shifts, period), F(y, q, p) = 0 its equations, K their
+Jacobian and M_i the propagators, the unknowns are z = (y, w, q, p), for torus points (y, a, u, c, q, p):
+
+* folds: K w = 0;
+* period doublings: M_i w_i = w_(i+1), M_m w_m = -w_1;
+* torus points with multipliers e^(+-ia), c = cos a: a_i and u_i are handed on like w_i, and at the end
+  M_m a_m = c a_1 - u_1, M_m u_m = (1 - c^2) a_1 + c u_1.  The equations stay regular at the strong resonances c = 1 and
+  c = -1, where the curve ends: beyond them lie neutral saddles;
+* branch points, period doublings and torus points of differences within clusters: M_i act on these differences.
+
+The derivatives of M_i w_i by states and parameters are exact: (x, w) is a state of the lifted network, and its
+propagators contain them.
+
+Source: Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed. (Springer, 2004), sections 10.2 and 10.3.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy import linalg
+
+from synchain.models.dynamics.lift import lifted
+from synchain.models.dynamics.reduction import without_drive
+
+from .arclength import Point, Test
+from .cycles import Cycles
+from .flow import TOLERANCE, Image, flow_of
+from .kinds import BifurcationKind
+from .periodic_result import PeriodicOrbit
+from .problems import GrowthNumbers
+from .results import Bifurcation
+from .transversal import expansion
+
+LARGEST = 2.0
+"""Largest entry of a critical vector, relative to the entry that is 1, before another entry is chosen (a choice)."""
+
+ONE_MODE = 1e-6
+"""Largest part of the image of a mode's deviations that leaves the mode, relative to the image (a choice)."""
+
+
+class CycleCurve:
+    """Folds, branch points of differences, period doublings or torus points of cycles."""
+
+    kinked = False
+
+    def __init__(self, first: Bifurcation, orbit: PeriodicOrbit, names: Sequence[str], ranges: np.ndarray) -> None:
+        scene = orbit.scene
+        if scene.equations.sticks:
+            raise ValueError(
+                "follow: found set-valued friction, stops or resets in two parameters; expected smooth rates; follow the "
+                "cycles in one parameter for some values of the other"
+            )
+        self.kind_of_points, self.critical_value, self.multiplicity = first.kind, first.critical, first.multiplicity
+        self.base = base = Cycles.of(orbit, *names)
+        self.names = base.names
+        base.set_ranges(ranges)
+        n = base.flow.size
+        # Deviations of the equations `network`, whose states are `copies` of those of the quotient, are the columns of
+        # `right`: all of them, or differences within clusters.  `left` returns their coordinates, in units of the extents.
+        self.of_differences = bool(first.mode)
+        network, self.copies, basis = base.flow.equations, np.eye(n), np.eye(n)
+        if self.of_differences:
+            network = without_drive(scene.equations, scene.parameters)
+            self.copies = expansion(network, orbit.classes, n)
+            basis = linalg.qr(self.copies)[0][:, n:]
+            if self.multiplicity > 1:  # one of the modes that pass together
+                parts = first.vectors.reshape(len(first.vectors) * (len(basis) // scene.n), scene.n)
+                mode = np.linalg.svd(np.vstack([parts.real, parts.imag]))[2][0]
+                basis = np.kron(np.eye(len(basis) // scene.n), mode[:, None])
+        elif self.multiplicity > 1:
+            raise ValueError(f"follow: found {self.multiplicity} multipliers that pass together; expected a single one")
+        self.scale = self.copies @ base.scale
+        self.right, self.left = self.scale[:, None] * basis, basis.T / self.scale
+        self.lift = lifted(network, [name for name in self.names if name in network.parameters])
+        self.seeds = dict.fromkeys(self.lift.seeds.values(), 0.0)
+        first_state = self._both(base.states(base.point)[:1] @ self.copies.T, 0.0)[0]
+        self.flow = flow_of(scene, self.lift.equations, self.names, first_state)
+        self.reference: np.ndarray | None = None  # left null vector of the last fold
+        start = base.accept(base.point, np.ones(len(base.point)))[0]
+        self.place, self.point = 0, start
+        self._begin(start)
+
+    # --- unknowns ---
+    @property
+    def size(self) -> int:
+        """Number of unknowns of the cycle."""
+        return len(self.base.point) - len(self.names)
+
+    @property
+    def is_fold(self) -> bool:
+        """Whether the critical vector contains a change of the period, as at a fold of cycles."""
+        return self.kind_of_points is BifurcationKind.FOLD
+
+    @property
+    def is_torus(self) -> bool:
+        """Whether a pair of multipliers is critical; the last unknown before the parameters is its cosine."""
+        return self.kind_of_points is BifurcationKind.TORUS
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Lengths are those of cycles; the critical vectors follow from them."""
+        inner = np.zeros(len(self.point) - len(self.base.point))
+        return np.insert(self.base.weights, self.size, inner)
+
+    def cycle(self, z: np.ndarray) -> np.ndarray:
+        """Return the unknowns (y, q, p) of the cycle at a point of the curve."""
+        return np.append(z[: self.size], z[-len(self.names) :])
+
+    def _vectors(self, z: np.ndarray) -> np.ndarray:
+        """Return the critical vectors in units of the extents: w, or (a, u)."""
+        end = len(z) - len(self.names) - self.is_torus
+        return z[self.size : end]
+
+    def _units(self) -> np.ndarray:
+        """Return the units of w: extents of the states, shifts by the largest of them, the period."""
+        base = self.base
+        shifts = np.full(base.shifts.shape[1], float(base.scale.max()))
+        period = [] if base.periods else [base.point[self.size - 1]]
+        return np.concatenate([np.tile(self.scale, base.segments), shifts, period])
+
+    def _begin(self, point: np.ndarray) -> None:
+        """Compute the critical vectors of a cycle, and make it the reference."""
+        base = self.base
+        if self.is_fold:
+            inner = np.linalg.svd(self._bordered(point)[0])[2][-1]
+        else:
+            image, m = self._image(point, np.zeros((base.segments, len(self.left)))), base.segments
+            propagators = self._own(image)
+            values, vectors = np.linalg.eig(
+                np.linalg.multi_dot([np.eye(len(self.left)), *propagators[::-1], np.eye(len(self.left))])
+            )
+            chosen = int(np.abs(values - self.critical_value).argmin())
+            if self.multiplicity > 1:
+                moved = image.propagators[0][np.ix_(self.lift.deviations, self.lift.deviations)] @ self.right
+                if np.abs(moved - self.right @ propagators[0]).max() > ONE_MODE * np.abs(moved).max():
+                    raise ValueError(
+                        "follow: found modes that do not separate; expected differences of one mode of the graph"
+                    )
+            parts = [vectors[:, chosen]]
+            for each in propagators[: m - 1]:
+                parts.append(each @ parts[-1])
+            inner = np.concatenate(parts)
+        self.place = int(np.abs(inner).argmax())
+        inner = inner / inner[self.place]
+        if self.is_torus:
+            value = values[chosen] / abs(values[chosen])
+            inner = np.concatenate(
+                [inner.real, abs(value.imag) * inner.imag * math.copysign(1.0, value.imag), [value.real]]
+            )
+        self.point = np.insert(point, self.size, inner.real)
+
+    # --- equations ---
+    def _both(self, states: np.ndarray, deviations: np.ndarray | float) -> np.ndarray:
+        """Return states (k, 2 N) of the lifted network."""
+        both = np.zeros((len(states), self.lift.equations.dimension))
+        both[:, self.lift.states], both[:, self.lift.deviations] = states, deviations
+        return both
+
+    def _image(self, point: np.ndarray, vectors: np.ndarray) -> Image:
+        """Integrate cycle and deviations over all segments. Shapes: vectors (r m, k), r of them for each segment."""
+        base, count = self.base, len(vectors)
+        values = {**base.values(point), **self.seeds}
+        states = np.tile(base.states(point) @ self.copies.T, (count // base.segments, 1))
+        scale = self._both(self.scale[None], self.scale)[0]
+        times = np.full(count, base.period(point) / base.segments)
+        return self.flow.linearise(values, self._both(states, vectors @ self.right.T), times, scale)
+
+    def _own(self, image: Image) -> np.ndarray:
+        """Return the propagators (r m, k, k) of the deviations."""
+        deviations = [*self.lift.deviations]
+        return np.asarray(self.left @ image.propagators[:, deviations][:, :, deviations] @ self.right)
+
+    def _bordered(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return K in units of the extents, and residual and Jacobian of the cycle."""
+        residual, matrix = self.base.linearise(point)
+        scaled = matrix[:, : self.size] * self._units()
+        scaled[: self.base.phase.size] /= np.tile(self.scale, self.base.segments)[:, None]
+        return scaled, residual, matrix
+
+    def _cyclic(self, propagators: np.ndarray, turn: np.ndarray) -> np.ndarray:
+        """Return the matrix that hands deviations (r, m, k) on from segment to segment, with a matrix (r, r) at the end."""
+        r, m, k = len(turn), len(propagators), propagators.shape[1]
+        matrix, one = np.zeros((r, m, k, r, m, k)), np.eye(k)
+        for s in range(r):
+            for i in range(m):
+                matrix[s, i, :, s, i] += propagators[i]
+                for t, share in enumerate(turn[s] if i == m - 1 else np.eye(r)[s]):
+                    matrix[s, i, :, t, (i + 1) % m] -= share * one
+        return matrix.reshape(r * m * k, r * m * k)
+
+    def _parts(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return residual and Jacobian of the cycle, A of the critical vectors w, A_y w and A_c w."""
+        base, (m, n), q = self.base, self.base.phase.shape, len(self.names)
+        point, w = self.cycle(z), self._vectors(z)
+        rows = w[: m * n].reshape(m, n) if self.is_fold else w.reshape(-1, len(self.left))
+        image, values = self._image(point, rows), {**base.values(point), **self.seeds}
+        states, deviations = [*self.lift.states], [*self.lift.deviations]
+        moved = self.left @ image.propagators[:, deviations][:, :, states] @ self.copies
+        by_time = self.flow.rates(values, image.states)[:, deviations] @ self.left.T / m
+        columns = self.left @ image.columns[:, deviations] + by_time[:, :, None] * base.period_slopes(
+            base.values(point)
+        )
+        by_cosine = np.zeros(len(w))
+        if self.is_fold:
+            matrix, residual, jacobian = self._bordered(point)
+            if not base.periods:
+                # A change tau of the period moves the end by f tau/m: the derivatives of f along those of the end.
+                ends, tau = image.states[:, states], w[-1] * self._units()[-1] / m
+                rates = self.flow.rates(values, image.states)[:, states]
+                ahead = np.concatenate([image.propagators[:, states][:, :, states], rates[:, :, None] / m], axis=2)
+                for i, end in enumerate(ends):
+                    along = self.flow.rates(values, self._both(np.tile(end, (n + 1, 1)), ahead[i].T))
+                    along = tau * along[:, deviations] / self.scale
+                    moved[i] += along[:n].T
+                    by_time[i] += along[n]
+                    for j, name in enumerate(self.names):
+                        seeds = {self.lift.seeds[name]: 1.0} if name in self.lift.seeds else {}
+                        both = self._both(end[None], image.columns[i, states, j])
+                        columns[i, :, j] += tau * self.flow.rates({**values, **seeds}, both)[0, deviations] / self.scale
+        else:
+            residual, jacobian = base.linearise(point)
+            sign = -1.0 if self.kind_of_points is BifurcationKind.PERIOD_DOUBLING else 1.0
+            turn, by = np.full((1, 1), sign), np.zeros((1, 1))
+            if self.is_torus:
+                c = z[-3]
+                turn, by = np.array([[c, -1.0], [1.0 - c * c, c]]), np.array([[1.0, 0.0], [-2.0 * c, 1.0]])
+            matrix = self._cyclic(self._own(image)[:m], turn)
+            ends = by_cosine.reshape(len(turn), m, -1)
+            ends[:, -1] = -by @ w.reshape(len(turn), m, -1)[:, 0]
+        bent = np.zeros((len(w), len(point)))
+        for i, (block, time, column) in enumerate(zip(moved, by_time, columns, strict=True)):
+            k, s = len(block), i % m
+            bent[i * k : i * k + k, s * n : s * n + n] = block
+            bent[i * k : i * k + k, -q:] = column
+            if not base.periods:
+                bent[i * k : i * k + k, self.size - 1] = time
+        return residual, jacobian, matrix, bent, by_cosine
+
+    def linearise(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the residual and its derivatives."""
+        residual, jacobian, matrix, bent, by_cosine = self._parts(z)
+        size, w, q = self.size, self._vectors(z), len(self.names)
+        ones = [self.place, self.place + len(w) // 2] if self.is_torus else [self.place]
+        unit = np.zeros((len(ones), len(w)))
+        unit[range(len(ones)), ones] = 1.0
+        full = np.zeros((size + len(w) + len(ones), len(z)))
+        full[:size, :size], full[:size, -q:] = jacobian[:, :size], jacobian[:, -q:]
+        full[size : size + len(w), :size], full[size : size + len(w), -q:] = bent[:, :size], bent[:, -q:]
+        full[size:, size : size + len(w)] = np.vstack([matrix, unit])
+        if self.is_torus:
+            full[size : size + len(w), -q - 1] = by_cosine
+        return np.concatenate([residual, matrix @ w, w[ones] - [1.0, 0.0][: len(ones)]]), full
+
+    def noise(self, z: np.ndarray) -> np.ndarray:
+        """Return what the integration leaves: its tolerance times the sizes of the terms."""
+        w, largest = self._vectors(z), max(1.0, float(np.abs(self._vectors(z)).max()))
+        sizes = np.full(len(w) + 1 + self.is_torus, TOLERANCE * largest)
+        return np.append(self.base.noise(self.cycle(z)), sizes)
+
+    def accept(self, z: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Make a solution the reference; compute the vectors anew if segments are divided or the fixed entry is small."""
+        size, q, segments = self.size, len(self.names), self.base.segments
+        inner, moved = z[size:-q], tangent[size:-q]
+        point, ahead = self.base.accept(self.cycle(z), self.cycle(tangent))
+        self.point = np.insert(point, self.size, inner)
+        if self.base.segments != segments or float(np.abs(self._vectors(z)).max()) > LARGEST:
+            if self.is_torus:
+                self.critical_value = complex(z[-3], math.sqrt(max(0.0, 1.0 - z[-3] ** 2)))
+            self._begin(point)
+            moved = np.zeros(len(self.point) - len(point))
+        tangent = np.insert(ahead, self.size, moved)
+        if self.is_fold and not self.of_differences:
+            self.reference = self._null(self._bordered(point)[0])
+        return self.point, tangent / float(np.linalg.norm(self.weights * tangent))
+
+    # --- what happens along the curve ---
+    def critical(self, z: np.ndarray) -> GrowthNumbers:
+        """Return the multipliers but the critical ones."""
+        values: list[complex] = [-1.0 if self.kind_of_points is BifurcationKind.PERIOD_DOUBLING else 1.0]
+        if self.is_torus:
+            root = complex(np.emath.sqrt(1.0 - z[-3] ** 2))
+            values = [z[-3] + 1j * root, z[-3] - 1j * root]
+        return self.base.critical(self.cycle(z)).without(values * self.multiplicity)
+
+    def kind(self, value: complex, turned: bool) -> BifurcationKind:
+        """Return the kind of all points of the curve."""
+        return self.kind_of_points
+
+    def _null(self, matrix: np.ndarray) -> np.ndarray:
+        """Return the left null vector, in the direction of that of the last point."""
+        u = np.linalg.svd(matrix)[0][:, -1]
+        return u if self.reference is None or len(self.reference) != len(u) or u @ self.reference > 0.0 else -u
+
+    def tests(self) -> Mapping[str, Test]:
+        """Return the test functions of points of codimension two."""
+
+        def cusp(point: Point) -> float:
+            _, _, matrix, bent, _ = self._parts(point.z)
+            vector = self._units() * self._vectors(point.z)
+            return float(self._null(matrix) @ (bent[:, : self.size] @ vector))
+
+        if self.is_torus:
+            return {"1:3 resonance": lambda point: point.z[-3] + 0.5, "1:4 resonance": lambda point: point.z[-3]}
+        return {"cusp": cusp} if self.is_fold else {}
+
+    def limits(self) -> Mapping[str, Test]:
+        """Return functions that are positive on the curve; it ends where one is zero."""
+        if not self.is_torus:
+            return {}
+        return {"1:1 resonance": lambda point: 1.0 - point.z[-3], "1:2 resonance": lambda point: 1.0 + point.z[-3]}
+
+    def passing(self, value: complex) -> str:
+        """Name the point at which another multiplier passes; real if its imaginary part is zero."""
+        other = self.base.kind(value, turned=True)
+        if other is self.kind_of_points and not self.of_differences and not self.is_torus:
+            return "1:1 resonance" if self.is_fold else "1:2 resonance"
+        return f"{self.kind_of_points} with {other}"
+
+    def frequency(self, z: np.ndarray) -> float:
+        """Return the angular frequency of the second oscillation at a torus point, 0 elsewhere."""
+        return math.acos(min(1.0, max(-1.0, z[-3]))) / self.period(z) if self.is_torus else 0.0
+
+    def period(self, z: np.ndarray) -> float:
+        """Return the period of the cycle."""
+        return self.base.period(self.cycle(z))
+
+    def state(self, z: np.ndarray) -> np.ndarray:
+        """Return the state of the network at the beginning of a period."""
+        base = self.base
+        return np.asarray(expansion(base.scene.equations, base.classes, base.flow.size) @ base.states(self.cycle(z))[0])
