@@ -182,7 +182,10 @@ class Sections:
     @cached_property
     def _laws(self) -> list[Law]:
         """The law of each contact or row in the order of `owners`."""
-        conditions = ((self.scene.equations.node_at(i).conditions[a]) for i, a in self.owners)
+        equations = self.scene.equations
+        if equations.joined:
+            return [row.law for part in equations.parts for row in part.template.rows]
+        conditions = (equations.node_at(i).conditions[a] for i, a in self.owners)
         return [condition.law if isinstance(condition, Row) else Law.SIGN for condition in conditions]
 
     @cached_property

@@ -110,6 +110,7 @@ def test_a_cradle_of_three(integrator: str) -> None:
     result = sc.run(given, workers=1, show_progress=False)
     assert result.events.event_time.values == pytest.approx([1.0, 39 / 19, 381.0], abs=1e-10)
     assert list(result.events.event_node.values) == [2, 3, 2]
+    assert list(result.data["event_impacts"].values) == [0, 2, 1]
     assert result.end.sel(component="v").values == pytest.approx([0.047625, 0.049875, 0.9025], abs=1e-10)
 
 
