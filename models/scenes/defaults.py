@@ -125,6 +125,17 @@ def _check_graphs(model: Model, differing: tuple[str, ...]) -> None:
             )
 
 
+MODEL_KEYWORDS = frozenset({"oscillator", "friction", "contact", "coupling", "topology", "links", "nodes", "draws"})
+"""Keywords on which the names of parameters depend."""
+
+
+def model_of(keywords: Mapping[str, Any]) -> Model:
+    """Return the model of a scene with some keywords."""
+    drawn = draws(keywords["draws"], keywords["realisations"])
+    model: Model = _model(keywords, drawn, check_seed("rng", keywords["rng"], LIMITS["rng"][1]))["model"]
+    return model
+
+
 def _model(keywords: Mapping[str, Any], drawn: Mapping[str, Draws], rng: int) -> dict[str, Any]:
     """Return the model and its parts, on the union of drawn graphs if there are any."""
     oscillator = as_oscillator(keywords["oscillator"])

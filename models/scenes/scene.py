@@ -31,7 +31,7 @@ from ..sweeps.axis import Axis
 from ..sweeps.checked_axes import Continuation
 from ..sweeps.draw import GRAPH, Draws, drawn_axes
 from ..sweeps.parameters import drive, varied, without
-from .defaults import TimeUnit, complete
+from .defaults import MODEL_KEYWORDS, TimeUnit, complete, model_of
 from .dictionary import arguments, as_dict
 from .section import Section
 from .toml import write
@@ -375,8 +375,9 @@ class Scene(HasDrawing, HasLatex):
         Parameters
         ----------
         **changes
-            Keywords of `Scene`, or names of parameters such as sigma.  The name of a parameter changes only this
-            parameter; `parameters` replaces all of them.  Keywords that were never given follow their defaults.  Given
+            Keywords of `Scene`, or names of parameters such as sigma, of the new model.  The name of a parameter changes
+            only this parameter; `parameters` replaces all of them.  A list is one number for each node or link; the
+            numbers of a sweep are an axis, of `run` or of the keyword `axes`.  A named parameter replaces its axis.  Keywords that were never given follow their defaults.  Given
             initial states are kept: a number or a range fits every number of nodes; a list that no longer fits raises
             ValueError.
 
@@ -386,10 +387,13 @@ class Scene(HasDrawing, HasLatex):
             For unknown names, and for values that `Scene` refuses.
         """
         # Separate names of parameters, names of keywords, and unknown names.
-        single = {name: changes.pop(name) for name in tuple(changes) if name not in self.given and self.takes(name)}
-        strange = next((name for name in changes if name not in self.given), None)
+        single = {name: changes.pop(name) for name in tuple(changes) if name not in self.given}
+        model = self.model
+        if any(model.parameter(name) is None for name in single) and not MODEL_KEYWORDS.isdisjoint(changes):
+            model = model_of({**self.given, **changes})  # the new contact, friction or graph has other parameters
+        strange = next((name for name in single if model.parameter(name) is None), None)
         if strange is not None:
-            names, reason = (*self.parameters, *self.given), self.model.no_link(strange) or unsupported(strange)
+            names, reason = (*model.parameters, *self.given), model.no_link(strange) or unsupported(strange)
             raise TypeError(
                 f"unknown parameter {strange!r}; {reason}"
                 if reason
@@ -410,6 +414,10 @@ class Scene(HasDrawing, HasLatex):
         if keywords["parameters"] is not None or single:
             table = {} if keywords["parameters"] is None else check_table("parameters", keywords["parameters"])
             keywords["parameters"] = {**without(self.model, table, single), **single}
+        if "axes" not in changes and any(axis.name in single for axis in self.axes):
+            # one number in place of an axis, as in `run`
+            keywords["axes"] = tuple(axis for axis in self.axes if axis.name not in single)
+            keywords["zipped"] = self.zipped and bool(keywords["axes"])
         if self.varied and "parameters" not in changes and _node_count(keywords) != self.n:
             raise ValueError(
                 f"{self.varied[0]} has values for {self.n} nodes, or for their links; give `parameters` for another number"

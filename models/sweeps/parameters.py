@@ -116,7 +116,10 @@ def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:
         if isinstance(value, set | frozenset):
             raise TypeError(f"{what}: found a set, which has no order; expected a number or a list")
         listed, count = first_of(value.tolist() if hasattr(value, "tolist") else value, max(len(links), model.n))
-        table = _matrix(what, model.n, listed) if any(map(_listed, listed)) else in_order(what, links, listed, count)
+        if any(map(_listed, listed)):
+            table = _matrix(what, model.n, listed)
+        else:
+            table = in_order(what, links, listed, count, f"; {a_sweep(name)}")
     for i, j in sorted(table.keys() ^ links.keys()):
         if (i, j) in links or check_number(what, table[i, j]) != 0:
             excess = "no number" if (i, j) in links else "a number without a link"
@@ -126,6 +129,11 @@ def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:
             )
     checked = {at: in_range(str(link), table[at], parameter) for at, link in links.items()}
     return by_name(what, links, checked)
+
+
+def a_sweep(name: str) -> str:
+    """Return how to compare the numbers of a list, for messages about its length."""
+    return f"numbers to compare are an axis: run(scene, {name}=[…])"
 
 
 def by_name(
@@ -143,7 +151,7 @@ def by_name(
 
 
 def in_order(
-    what: str, links: Mapping[tuple[int, int], LinkName], listed: Sequence[T], count: str
+    what: str, links: Mapping[tuple[int, int], LinkName], listed: Sequence[T], count: str, more: str = ""
 ) -> dict[tuple[int, int], T]:
     """Return the numbers of a list, one for each edge or each link, by (target, source)."""
     edges = [at for at in links if at[0] < at[1]] if all(at[::-1] in links for at in links) else []
@@ -153,7 +161,7 @@ def in_order(
     if len(listed) != len(links):
         expected = f"{len(edges)} values, one for each edge, or " if edges else ""
         raise ValueError(
-            f"{what}: found {count} values for {len(links)} links; expected {expected}one for each link, or one number for all"
+            f"{what}: found {count} values for {len(links)} links; expected {expected}one for each link, or one number for all{more}"
         )
     return dict(zip(links, listed, strict=True))
 
@@ -175,7 +183,8 @@ def _for_each_node(model: Model, name: str, value: Any) -> list[float]:
     listed, count = first_of(value.tolist() if hasattr(value, "tolist") else value, n)
     if len(listed) != n:
         raise ValueError(
-            f"parameter {name!r}: found {count} values for {n} oscillators; expected {n} values or one number for all"
+            f"parameter {name!r}: found {count} values for {n} oscillators; expected {n} values or one number for all; "
+            f"{a_sweep(name)}"
         )
     return [in_range(str(NodeName(name, i)), entry, parameter) for i, entry in zip(holders, listed, strict=True)]
 

@@ -432,6 +432,33 @@ def test_another_network_keeps_the_start_that_was_given() -> None:
     assert scene.replace(topology=from_matrix([[-2, 2], [2, -2]])).initial["x"] == (1.0, 2.0)
 
 
+def test_replace_takes_the_parameters_of_the_new_model() -> None:
+    exact = Scene(topology=chain(2), contact="set-valued")
+    smooth = exact.replace(contact="atan", kappa=1e4)
+    assert smooth == exact.replace(contact="atan").replace(kappa=1e4)
+    assert smooth.parameters["kappa"] == 1e4
+    assert Scene(topology=chain(1)).replace(topology=chain(2), sigma=0.2).parameters["sigma"] == 0.2
+    with pytest.raises(TypeError, match="unknown parameter or keyword 'kappa'; known: theta_b"):
+        exact.replace(kappa=1e4)
+    with pytest.raises(TypeError, match=r"unknown parameter or keyword 'kapa'; .* kappa"):
+        exact.replace(contact="atan", kapa=1e4)
+    with pytest.raises(ValueError, match="unknown parameter 'kappa'"):
+        smooth.replace(contact="set-valued")
+
+
+def test_a_parameter_replaces_its_axis_and_lists_are_no_axes() -> None:
+    swept = two(axes={"sigma": [0.1, 0.2], "omega": [1.0, 1.1]}, zipped=True)
+    fixed = swept.replace(sigma=0.3)
+    assert (fixed.axes, fixed.zipped, fixed.parameters["sigma"]) == (two(axes={"omega": [1.0, 1.1]}).axes, True, 0.3)
+    assert (fixed.replace(omega=1.2).axes, fixed.replace(omega=1.2).zipped) == ((), False)
+    assert swept.replace(u=0.2).axes == swept.axes
+    words = r"numbers to compare are an axis: run\(scene, sigma=\[…\]\)"
+    with pytest.raises(ValueError, match=f"found 3 values for 2 links.*{words}"):
+        two().replace(sigma=[0.1, 0.2, 0.3])
+    with pytest.raises(ValueError, match=f"found 3 values for 2 oscillators.*{words.replace('sigma', 'u')}"):
+        two().replace(u=[0.1, 0.2, 0.3])
+
+
 def test_replace_between_one_and_many() -> None:
     one = Scene(parameters={"omega": 1.4})
     many = one.replace(topology=chain(4))
