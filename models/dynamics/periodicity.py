@@ -85,7 +85,9 @@ def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Dr
     """Return the waves of a driven network and the largest frequency that divides all of them."""
     # Collect the frequencies of the unchanged rates. Time must occur only in sines and cosines.
     frequencies: set[sp.Expr] = set()
-    without = [_without_waves(e, _local(template), frequencies) for template in templates for e in template.driven]
+    modes = {row.mode.name for template in templates if isinstance(template, Node) for row in template.rows}
+    rates_of = [(e, _local(template)) for template in templates for e in _off_surfaces(template, modes)]
+    without = [_without_waves(e, states, frequencies) for e, states in rates_of]
     waves = tuple(sorted(frequencies, key=sp.default_sort_key))
     if any(e.has(TIME) for e in without):
         return Drive(waves, problem="depends on time other than by sines and cosines of a t + b, a constant")
@@ -95,7 +97,7 @@ def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Dr
         return Drive(waves, problem=problem)
 
     # Write products and powers as sums of waves: cos(w t)**2 has only the frequency 2 w.
-    rates = [(_sum_of_waves(e), _local(template)) for template in templates for e in template.driven if e.has(TIME)]
+    rates = [(_sum_of_waves(e), states) for e, states in rates_of if e.has(TIME)]
     summed: set[sp.Expr] = set()
     for e, states in rates:
         _without_waves(e, states, summed)
@@ -113,6 +115,17 @@ def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Dr
         while times < MOST_TIMES and all(_repeats(e, states, frequency, k * times) for e, states in rates):
             times *= k
     return Drive(waves, times * share * paces[0])
+
+
+def _off_surfaces(template: Node | Edge, modes: set[str]) -> tuple[sp.Expr, ...]:
+    """Return expressions that repeat themselves in time where all rates and events do.
+
+    The rates on surfaces follow from those off all surfaces, from pushes and from levels, which are much shorter.
+    """
+    rows = template.rows if isinstance(template, Node) else ()
+    of_rows = (e for row in rows for e in (row.level, row.ratio, *row.push, *(e for _, e in row.sets)))
+    free = {s: sp.S.One for s in _local(template) if s.name in modes or s.name[:-2] in modes}
+    return tuple(e.xreplace(free) for e in (*template.driven, *of_rows))
 
 
 def _sum_of_waves(e: sp.Expr) -> sp.Expr:

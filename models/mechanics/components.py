@@ -73,7 +73,7 @@ class Node:
     @property
     def forced(self) -> bool:
         """True if time occurs explicitly."""
-        return any(e.has(TIME) for e in self.driven)
+        return any(e.has(TIME) for e in (*self.driven, *self.expressions))
 
     @property
     def continuous(self) -> tuple[sp.Symbol, ...]:

@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from synchain import Rates, Scene, ends
+from synchain import Friction, Lagrangian, Potential, Rates, Reset, Scene, Stop, ends
 from synchain.codegen.driver.columns import SpanColumn
 from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
@@ -353,3 +353,15 @@ def test_planes_and_clusters_count_the_periods_of_the_drive(files: Path) -> None
     full = cluster_exponents(scene(files, parameters={"sigma": 0.1}), [0, 0], precision=2e-3, periods=10000)
     assert full.motion == pytest.approx(0.158, abs=0.015)
     assert full.exponent[0] == pytest.approx(0.118, abs=0.015)  # sigma |gamma| = 0.2
+
+
+def test_the_drive_of_rows_is_read_off_their_surfaces() -> None:
+    """Time in a guard alone is a drive; that of three rows over a mass matrix is found without their minors."""
+    V, x, y, v, u, t = sp.symbols("V x y v u t")
+    fires = Field({V: 2 - V}, events=[Reset(V - 1 - sp.cos(4 * t) / 10, {V: 0})])
+    assert Scene(fires, topology=ALONE).period == pytest.approx(np.pi / 2)
+    kinetic = (v**2 + sp.cos(y) * v * u / 2 + 2 * u**2) / 2
+    rub = [Friction(sp.cos(6 * t) / 3 - v - u / 2, 1 + x**2, "coulomb"), Friction(-v, 1, "coulomb"), Stop(1 - y, "1/2")]
+    pad = Lagrangian(kinetic, x**2 + y**2, {x: sp.sin(4 * t)}, coordinates={x: v, y: u}, events=rub, contact="set-valued")
+    pair = Scene(pad, Potential("k*W*(y_i - y_j)**2/2", {"k": 0.1}), topology=PAIR)
+    assert pair.period == pytest.approx(np.pi)
