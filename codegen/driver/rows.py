@@ -410,7 +410,9 @@ def change_modes(moved, t, y, friction):
     for lane in range(WIDTH):
         for row in range(dims.rows if (events >> lane) & 1 else 0):
             before, after = notes[lane, row, BEFORE], number(MODE, row, lane, out, dims)
-            put(out, place(6, row, dims), lane, 1.0 if notes[lane, row, SHUT] != 0.0 or before != after else 0.0)
+            # a rebound and a reset leave the mode as it is; a surface that is touched and not crossed is no event
+            leaps = notes[lane, row, SHUT] != 0.0 and number(LAW, row, lane, out, dims) != OF_SIGN
+            put(out, place(6, row, dims), lane, 1.0 if leaps or before != after else 0.0)
             put(out, place(7, row, dims), lane, before)
             put(out, place(8, row, dims), lane, after)
     return events

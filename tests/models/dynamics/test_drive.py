@@ -362,6 +362,8 @@ def test_the_drive_of_rows_is_read_off_their_surfaces() -> None:
     assert Scene(fires, topology=ALONE).period == pytest.approx(np.pi / 2)
     kinetic = (v**2 + sp.cos(y) * v * u / 2 + 2 * u**2) / 2
     rub = [Friction(sp.cos(6 * t) / 3 - v - u / 2, 1 + x**2, "coulomb"), Friction(-v, 1, "coulomb"), Stop(1 - y, "1/2")]
-    pad = Lagrangian(kinetic, x**2 + y**2, {x: sp.sin(4 * t)}, coordinates={x: v, y: u}, events=rub, contact="set-valued")
+    pad = Lagrangian(
+        kinetic, x**2 + y**2, {x: sp.sin(4 * t)}, coordinates={x: v, y: u}, events=rub, contact="set-valued"
+    )
     pair = Scene(pad, Potential("k*W*(y_i - y_j)**2/2", {"k": 0.1}), topology=PAIR)
     assert pair.period == pytest.approx(np.pi)
