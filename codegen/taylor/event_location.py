@@ -94,6 +94,40 @@ def closing(side, late, size, nearest, dense, first, room, degree, ratio):
     return passage(side, 1e4*size, 1e-14 + late, nearest, dense, first, degree, ratio)
 '''.strip()
 
+ROW_CLOSING = '''
+NOTHING = 1e-9
+
+
+@njit(error_model='numpy')
+def row_closing(side, late, size, nearest, dense, first, room, degree, ratio):
+    """`passage` of a gap of a row, from above; a gap that begins at zero is divided by the time, as often as it does.
+
+    The modes of rows are decided before a step: a gap at zero or below has just opened, and its first coefficients are
+    zero to rounding.  A gap that falls from there closes at once.
+    """
+    begins = load(dense, first, WIDTH) <= ROUNDING*size
+    if not any_lane(begins & (side > 0.5)):
+        return passage(side, 1e4*size, 1e-14 + late, nearest, dense, first, degree, ratio)
+    way, power = 0.0*ratio, ratio
+    for k in range(degree, 0, -1):
+        way = fma(way, ratio, absolute(load(dense, first + k, WIDTH)))
+    way = way*ratio
+    for k in range(degree + 1):
+        store(dense, room + k, load(dense, first + k, WIDTH))
+    for _ in range(3):
+        for k in range(degree):
+            store(dense, room + k, select(begins, load(dense, room + (k + 1), WIDTH), load(dense, room + k, WIDTH)))
+        store(dense, room + degree, select(begins, 0.0, load(dense, room + degree, WIDTH)))
+        start = load(dense, room, WIDTH)*power
+        begins = begins & (start <= 0.0) & (start > -NOTHING*way)
+        power = power*ratio
+        if not any_lane(begins):
+            break
+    falls = (load(dense, room, WIDTH) < 0.0) & ~begins & (side > 0.5)
+    passed = passage(side, 1e4*size, 1e-14 + late, nearest, dense, room, degree, ratio)
+    return select(falls, minimum(nearest, ratio), passed)
+'''.strip()
+
 SIDES = '''
 @njit(error_model='numpy', forceinline=True)
 def side_or(value, hint):
@@ -107,7 +141,12 @@ def found_side(begun, side):
     return select((absolute(begun) < 0.5) & (absolute(side) > 0.5), side, 0.0*side)
 '''.strip()
 
-FUNCTIONS = {PASSAGE: {"side_of", "passage", "closing"}, CLOSING: {"closing"}, SIDES: {"side_or", "found_side"}}
+FUNCTIONS = {
+    PASSAGE: {"side_of", "passage", "closing", "row_closing"},
+    CLOSING: {"closing"},
+    ROW_CLOSING: {"row_closing"},
+    SIDES: {"side_or", "found_side"},
+}
 """For each text, the names of the functions that need the text; a step that calls one of them includes the text."""
 
 LATE = 1e-10
@@ -142,7 +181,8 @@ def closings(
     # the first gap can close in stick and in slip, the second gap only in stick
     for side, gap in zip((ONE + 0.0 * Name("t"), Name(stuck)), gaps, strict=False):
         coefficients = ("dense", gap.first, room, gap.order, "passed")
-        statements += [let("passed", call("closing", side, late, gap.size, "nearest", *coefficients))] * rounds
+        closing = "closing" if rounds == 1 else "row_closing"
+        statements += [let("passed", call(closing, side, late, gap.size, "nearest", *coefficients))] * rounds
     return statements
 
 

@@ -40,7 +40,7 @@ from .step_length import finished, last_orders, reach
 
 WORDS = frozenset(
     {"unseen", "high", "low", "largest", "scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "TERMS", "j_there",
-     "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", "nearest", "loose", "closing", "side_or", "found_side", "news", "new", "floor", "value", "stuck", "side", "way", "room", *LANE_FUNCTIONS.values()}
+     "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", "nearest", "loose", "closing", "row_closing", "NOTHING", "side_or", "found_side", "news", "new", "floor", "value", "stuck", "side", "way", "room", *LANE_FUNCTIONS.values()}
 )  # fmt: skip
 PREFIXES = ("positive_", "i_", "e_", "half_", "w_", "n_", "size_", "odd_", "stuck_", "hint_")
 """Prefixes of variables of the step; a user's symbol with such a prefix is renamed within the step."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.optimize import brentq
 
 import synchain as sc
 from synchain.models.scenes.file import load_scene
@@ -191,3 +192,22 @@ def test_a_start_behind_a_stop(start: float, message: str) -> None:
         end(scene(BALL, 1.0, "taylor", initial={"y": [start], "v": [-1.0]}))
     with pytest.raises(TypeError, match="expected Reset"):
         sc.Field({V: -V}, events=[sc.Stop(V)])
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize("strength", [1.001, 1.05, 1.5])
+def test_a_ball_is_thrown_off_a_table_and_lands(integrator: str, strength: float) -> None:
+    """x'' = -1 over A sin(3 t): it is thrown where A 9 sin(3 t) = 1 and lands where the parabola meets the table."""
+    A, w = sp.Symbol("A"), 3.0
+    ball = sc.Lagrangian(
+        V**2 / 2, X, coordinates={X: V}, parameters={A: strength / 9}, events=[sc.Stop(X - A * sp.sin(3 * T), 0)]
+    )
+    size, begin = strength / 9, np.arcsin(1 / strength) / w
+    thrown = lambda t: size * np.sin(w * begin) + size * w * np.cos(w * begin) * (t - begin) - (t - begin) ** 2 / 2  # noqa: E731
+    land = brentq(lambda t: thrown(t) - size * np.sin(w * t), begin + 1e-3, begin + 2.0, xtol=1e-15)
+    for rtol in (1e-5, 1e-9):
+        given = scene(ball, 1.0, integrator, initial={"x": [0.0], "v": [strength / 3]}, rtol=rtol, atol=rtol / 10)
+        for t in (begin + 0.4 * (land - begin), land - 1e-3, land + 1e-3, land + 0.1):
+            x, _, mode = end(given.replace(window=float(t))).ravel()
+            assert mode == (t < land)
+            assert x == pytest.approx(thrown(t) if t < land else size * np.sin(w * t), abs=10 * rtol)
