@@ -42,4 +42,4 @@ print(reproduction)
 for A, r in zip(strengths, order, strict=True):
     plt.plot(result.time, r[:, 1], label=f"A = {A}")
 plt.gca().set(xlabel="time", ylabel="order parameter r of the second population")
-plt.legend()
+plt.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=3)
