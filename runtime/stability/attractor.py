@@ -12,6 +12,7 @@ from enum import StrEnum
 
 import numpy as np
 import sympy as sp
+from scipy.linalg import orth
 
 from .limit_cycle import limit_cycle
 from .motion import rests
@@ -84,7 +85,7 @@ class Attractor:
             raise ValueError(f"{self.kind} motion has no eigenvalues to take exponents from")
         values = np.linalg.eigvals(self.propagators)
         if self.cycle == 0.0:
-            exponents = values.real.max(axis=-1)
+            exponents = values.real.max(axis=-1, initial=-np.inf)  # without any free direction, -inf
         else:
             with np.errstate(divide="ignore"):
                 exponents = (np.log(np.abs(values).max(axis=-1)) + self.logarithms) / self.cycle
@@ -112,7 +113,7 @@ class Attractor:
         _, error = self.exponents()
         if self.propagators is None or self.cycle:
             return error + ALIKE / self.cycle
-        return error + ALIKE * np.abs(self.propagators[1]).max(axis=(-2, -1))
+        return error + ALIKE * np.abs(self.propagators[1]).max(axis=(-2, -1), initial=0.0)
 
 
 def find_attractor(problem: OrbitProblem, state: np.ndarray, patience: float) -> tuple[Attractor, np.ndarray]:
@@ -126,9 +127,11 @@ def find_attractor(problem: OrbitProblem, state: np.ndarray, patience: float) ->
         return (_periodic if timed else _steady)(problem, state, Motion.LINEAR), state
     closed = max(RETURN, 0.1 * problem.scene.rtol)
     if not problem.forced:
-        if rests(problem.rates, state, closed, problem.extent):
+        # the speed of a held row is zero to rounding only
+        near = problem.rates.rounding(state, problem.unit) / closed if problem.variation.orbit.has_rows else 0.0
+        if rests(problem.rates, state, closed, np.maximum(problem.extent, near)):
             return _steady(problem, state, Motion.FIXED_POINT), state
-        cycle = None if problem.variation.events else limit_cycle(problem, state, closed)
+        cycle = limit_cycle(problem, state, closed)
         if cycle is None:
             return Attractor(Motion.APERIODIC, 0.0), state
         return _periodic(problem, cycle.state, Motion.PERIODIC, unit=cycle.period), state
@@ -208,4 +211,10 @@ def _steady(problem: OrbitProblem, state: np.ndarray, motion: Motion) -> Attract
             matrices[:, r, c] = base
             for unit, column in zip(np.eye(len(alphas)), columns, strict=True):
                 matrices[:, r, c] += (at(*values, *unit) - base) * column
+    if variation.events is not None and variation.events.jumps:
+        # held rows: only deviations along their surfaces move, q of p directions
+        at, deviations = dict(zip(symbols, values, strict=True)), variation.events.deviations[:p]
+        along = [[sp.diff(e, d).xreplace(at) for d in deviations] for e in variation.events.jumps[-1][:p]]
+        directions = orth(np.array(along, dtype=float))
+        matrices = directions.T @ matrices @ directions
     return Attractor(motion, 0.0, np.stack([matrices] * 3))

@@ -28,6 +28,9 @@ NEAR = 1e-3
 """Newton's method begins at a return only if the return is closer than NEAR times the extent of the motion (a
 choice)."""
 
+FREE, PARTS = 256, 16
+"""A free state is searched for FREE times in steps of 1/PARTS of a unit of time (choices)."""
+
 RETURNS = 32
 """Largest number of returns that are tried, and largest n for which period / n is tested as a period (a choice)."""
 
@@ -56,6 +59,7 @@ def limit_cycle(problem: OrbitProblem, start: np.ndarray, closed: float) -> Cycl
     `closed`: largest distance between the start and the end of a cycle, relative to the extent of each component.
     """
     alone = replace(problem, strengths=np.zeros_like(problem.strengths[:1]))
+    start = _free(alone, start)
     if rests(problem.rates, start, closed, problem.extent):
         return None
     for time, extent in islice(returns(partial(_integrator, alone), alone.rates, alone.extent, start), RETURNS):
@@ -88,6 +92,17 @@ def returns(
         if side(before) < 0.0 <= side(integrator.state):
             yield time + _passage(integrator, before, step, side), np.maximum(moved, NEAR * extent)
         time += step
+
+
+def _free(problem: OrbitProblem, start: np.ndarray) -> np.ndarray:
+    """Return the first state of an orbit (p,) that no contact, stop or surface holds; `start` if there is none."""
+    integrator, size, state = _integrator(problem, start), problem.components, start
+    for _ in range(FREE):
+        if np.all(state[size:] != 0.0):
+            return state
+        integrator.advance(problem.unit / PARTS)
+        state = integrator.state[0]
+    return start
 
 
 def _scale(extent: np.ndarray) -> np.ndarray:
@@ -123,25 +138,29 @@ def _passage(
 
 def _newton(problem: OrbitProblem, start: np.ndarray, time: float, extent: np.ndarray, closed: float) -> Cycle | None:
     """Return the cycle near a state, with a period near `time`; None if Newton's method leaves the neighbourhood."""
-    state, period, near, rates, scale = start, time, NEAR * extent, problem.rates, _scale(extent)
+    p, rates = problem.components, problem.rates  # the modes of contacts follow from the p components of a deviation
+    state, period, near, scale = start, time, NEAR * extent[:p], _scale(extent[:p])
     for steps in range(MOST_STEPS):
         try:
             image, matrix = _flow(problem, state, period)
         except FloatingPointError:  # the last correction led too far away
             return None
-        gap = image - state
+        gap = (image - state)[:p]
         if not np.all(np.abs(gap) <= near):
             return None
-        if np.all(np.abs(gap) <= closed * extent + rates.rounding(image, period)):
+        if np.all(np.abs(gap) <= closed * extent[:p] + rates.rounding(image, period)[:p]):
             return Cycle(image, period, matrix, steps)
         # solve (M - 1) dx + f(image) dT = -gap, f(state) dx = 0, components in units of `scale`, times in those of T
-        p = len(gap)
-        here, there = (period * rates.values(x) / scale for x in (state, image))
+        here, there = (period * rates.values(x)[:p] / scale for x in (state, image))
         bordered = np.zeros((p + 1, p + 1))
         bordered[:p, :p], bordered[:p, p], bordered[p, :p] = matrix * scale / scale[:, None] - np.eye(p), there, here
         change = np.linalg.lstsq(bordered, np.append(-gap / scale, 0.0), rcond=None)[0]
-        state, period = state + change[:-1] * scale, period + float(change[-1] * period)
-        if not (abs(period - time) < 0.5 * time and np.all(np.abs(state - start) <= 10.0 * near)):
+        moved, period = np.append(state[:p] + change[:-1] * scale, state[p:]), period + float(change[-1] * period)
+        if not (abs(period - time) < 0.5 * time and np.all(np.abs(moved - start)[:p] <= 10.0 * near)):
+            return None
+        try:
+            state = problem.with_slip_states(moved[None])[0]
+        except ValueError:  # behind a stop or a guard
             return None
     return None
 

@@ -108,8 +108,49 @@ def test_the_cycle_of_a_relay() -> None:
     """Feedback of 1/(s + 1)**3 by a relay that the motion only crosses: multipliers by matrix exponentials in 40 digits."""
     a, b, c = sp.symbols("a b c")
     loop = sc.Field({a: -sp.sign(c) - a, b: a - b, c: b - c}, contact="set-valued")
-    found = multipliers(lone(loop, a=-0.7258679257978837, b=-0.2906309222293034, c=-0.3))
-    assert found == pytest.approx([1.089112220369835e-4, 0.1474487637037114, 1.0], abs=1e-11)
+    start = {"a": -0.7258679257978837, "b": -0.2906309222293034, "c": -0.3}
+    assert multipliers(lone(loop, **start)) == pytest.approx([1.089112220369835e-4, 0.1474487637037114, 1.0], abs=1e-11)
+    found = sc.exponents(ring(loop, "a->a", **start), [0.0, 0.2, 0.5])
+    assert found.attractors[0].kind == "periodic"
+    assert found.exponent == pytest.approx([0.0, -0.068745533495445, -0.17990528081179], abs=1e-12)
+
+
+def test_a_cycle_of_stick_and_slip_is_closed() -> None:
+    """Undriven friction on a belt: exponents by multipliers of the cycle, as `periodic_orbit` computes them."""
+    belt = sc.Lagrangian(
+        V**2 / 2,
+        X**2 / 2,
+        {X: sc.friction(R(1, 5) - V)},
+        coordinates={X: V},
+        friction="exponential",
+        contact="set-valued",
+    )
+    scene = ring(belt, "spring", x=0.3, v=0.0)
+    found, orbit = sc.exponents(scene, [0.0, 0.5], transient=20), sc.periodic_orbit(scene)
+    assert found.attractors[0].kind == "periodic"
+    assert found.exponent[0] == pytest.approx(0.0, abs=1e-11)
+    growth = np.log(abs(orbit.transversal_multipliers(0.5)[0])) / orbit.period
+    assert found.exponent[1] == pytest.approx(growth, abs=1e-10)
+
+
+def test_motion_that_is_held_for_good() -> None:
+    """A body at rest on a stop, with a drive that does not lift it, and one that friction holds beside a free one."""
+    for drive in (sp.S.Zero, sp.cos(T) / 2):
+        pressed = sc.Lagrangian(V**2 / 2, X, {X: drive - V / 10}, coordinates={X: V}, events=[sc.Stop(X, R(1, 2))])
+        found = sc.exponents(ring(pressed, "spring", x=0.1, v=0.0), [0.0, 0.5], transient=20)
+        assert np.all(found.exponent == -np.inf)
+    held = sc.Lagrangian(
+        V**2 / 2 + OM**2 / 2,
+        X**2 / 2 + TH**2 / 2,
+        {X: sc.friction(-V), TH: -OM / 5},
+        coordinates={X: V, TH: OM},
+        friction="coulomb",
+        contact="set-valued",
+        events=[sc.Stop(TH + 5, R(1, 2))],
+    )
+    found = sc.exponents(ring(held, "spring on th", x=0.1, v=0.0, th=0.0, om=0.0), [0.0, 0.5], transient=20)
+    assert found.exponent == pytest.approx([0.0, 0.0], abs=1e-14)
+    assert found.attractors[0].kind == "fixed point"
 
 
 def test_links_that_a_sliding_node_balances() -> None:
