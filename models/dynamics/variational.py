@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import sympy as sp
 
 from ..interactions.link import strength
-from ..mechanics.calculus import derivative
+from ..mechanics.calculus import derivative, kink_of
 from ..mechanics.components import TIME, Edge, Node
 from ..mechanics.jumps import discontinuity, rough_at
 from ..symmetries.blocks import plus
@@ -96,6 +96,23 @@ def expect_continuous(orbit: Equations) -> None:
             raise ValueError(
                 f"small deviations: found {part}, by which rates jump, and deviations too; expected continuous rates, or "
                 'friction with contact = "set-valued"'
+            )
+    for node in orbit.nodes:
+        _expect_slopes(node)
+
+
+def _expect_slopes(node: Node) -> None:
+    """Raise ValueError for powers |h|**p with p < 1 of a level h: their slope is infinite where the motion is at h = 0."""
+    free = {mode: sp.S.One for mode in node.modes}
+    levels = [condition.level for condition in node.conditions]
+    for power in sorted({p for e in node.rhs for p in e.xreplace(free).atoms(sp.Pow)}, key=sp.default_sort_key):
+        inner = kink_of(power.base)
+        if inner is None or not (power.exp.is_number and 0 < power.exp < 1):
+            continue
+        if any(level != 0 and sp.cancel(inner / level).is_number for level in levels):
+            raise ValueError(
+                f"small deviations: found {power}, whose slope is infinite where slip begins; expected finite slopes, as of "
+                "(w**2 + 1e-12)**(1/4) in place of sqrt(abs(w))"
             )
 
 

@@ -15,6 +15,9 @@ import sympy as sp
 LARGEST_CANCELLED = 200
 """Most operations of an expression that is cancelled (a choice); products of minors exceed this number."""
 
+NOTHING = sp.Rational(1, 10**150)
+"""Added to a denominator that may vanish; it changes no other denominator above 1e-134."""
+
 MOST_TERMS = 5000
 """Most terms of an expression after multiplying out; longer expressions are not cancelled or expanded (a choice)."""
 
@@ -75,7 +78,23 @@ def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
             inner = kink.args[0]
             outer = smooth.diff(dummy).xreplace(shown)
             total += outer * sp.sign(inner) * derivative(inner, symbol)
-    return _joined_powers(_without_distributions(total))
+    return _zero_at_kinks(_joined_powers(_without_distributions(total)))
+
+
+def _zero_at_kinks(e: sp.Expr) -> sp.Expr:
+    """Write sign(w)/|w|**q as sign(w)/(|w|**q + NOTHING), which is 0 in place of 0/0 at w = 0.
+
+    The second derivative of |w|**(3/2) is infinite at w = 0, where slip begins and ends; deviations pass this instant.
+    """
+    return e.replace(
+        lambda p: isinstance(p, sp.Pow) and p.exp.is_negative and not p.exp.is_integer and kink_of(p.base) is not None,
+        lambda p: 1 / (p.base**-p.exp + NOTHING),
+    )
+
+
+def kink_of(base: sp.Expr) -> sp.Expr | None:
+    """Return w of a base that has the factor |w|; None without such a factor."""
+    return next((factor.args[0] for factor in sp.Mul.make_args(base) if isinstance(factor, sp.Abs)), None)
 
 
 def _joined_powers(e: sp.Expr) -> sp.Expr:

@@ -314,8 +314,8 @@ class VariationalIntegrator:
         if status is not Status.FINISHED:
             largest = np.hypot.reduce(self.strengths).max()
             modes = f" of strengths up to {largest:g}" if largest else ""
-            # rates of deviations have slopes of slopes: |w|^(3/2) has none at 0, where runs pass
-            remedy = "; deviations need finite second derivatives: write abs(w)**(3/2) as (w**2 + 1e-12)**(3/4)"
+            # rates of deviations have slopes of slopes: those of sqrt(|x|) have none at 0, where runs pass
+            remedy = "; deviations need finite slopes: write sqrt(abs(x)) as (x**2 + 1e-12)**(1/4), and abs(x)**p with a number p > 1"
             raise FloatingPointError(
                 f"the orbit with its deviations{modes} cannot be integrated: {status.message}"
                 f"{remedy if status is Status.STEP_UNDERFLOW else ''}"

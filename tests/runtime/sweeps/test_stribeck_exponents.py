@@ -61,3 +61,28 @@ def test_an_exponent_as_a_number(integrator: str) -> None:
     result = sc.run(scene("(3/2)").replace(integrator=integrator), show_progress=False)
     assert result.success
     np.testing.assert_allclose(result.end.sel(component="x").values.ravel(), [by_hand(1.5)], atol=2e-7)
+
+
+def powers(text: str) -> sc.Scene:
+    law = sc.friction_law(f"sign(w)*(3/10 + {text}/5)")
+    block = sc.Lagrangian("v**2/2", "x**2/2", {"x": "friction(1/5 - v) + cos(t)/3"}, coordinates={"x": "v"}, friction=law,
+                          contact="set-valued")  # fmt: skip
+    return sc.Scene(block, "spring", sc.graphs.chain(2), transient=0, window=6)
+
+
+def test_deviations_pass_the_start_of_slip_under_powers_above_one() -> None:
+    """The second derivative of |w|**(3/2) is infinite at w = 0: exponents are those of a law that is rounded there."""
+    smooth = sc.exponents(powers("(w**2 + 1e-10)**(3/4)"), [0.0, 0.1, 0.3]).exponent
+    np.testing.assert_allclose(sc.exponents(powers("abs(w)**(3/2)"), [0.0, 0.1, 0.3]).exponent, smooth, atol=2e-6)
+    result = sc.run(powers("abs(2*w)**(3/2)"), sigma=[0.1, 0.3], certified=True, show_progress=False)
+    assert result.success
+
+
+@pytest.mark.parametrize("text", ["sqrt(abs(w))", "(abs(w)/2)**(2/3)"])
+def test_infinite_slopes_at_rest_are_refused_before_a_run(text: str) -> None:
+    words = "small deviations: found .*, whose slope is infinite where slip begins; expected finite slopes"
+    with pytest.raises(ValueError, match=words):
+        sc.run(powers(text), sigma=[0.1, 0.3], certified=True, show_progress=False)
+    with pytest.raises(ValueError, match=words):
+        sc.exponents(powers(text), [0.1])
+    assert sc.run(powers(text), sigma=0.1, show_progress=False).success
