@@ -2,21 +2,21 @@ r"""
 Newton's cradle
 ===============
 
-Five equal balls hang side by side as pendula :math:`\ddot x_k = -x_k`.  Neighbours at rest are a small distance
-:math:`\delta` apart.  The first ball is pulled aside and released.  An impact with the restitution e between a moving
-ball and a ball at rest leaves :math:`\tfrac12(1-e)` of the speed to the first and passes :math:`\tfrac12(1+e)` on.
-A ball that passes its place with the speed s therefore hands on
+Five equal balls hang side by side as pendula :math:`\ddot x_k = -x_k`.  At rest, neighbours are a small distance
+:math:`\delta` apart.  The first ball is pulled aside and released.  In an impact with the restitution e, a moving ball
+transfers :math:`\tfrac12(1+e)` of its speed to a ball at rest.  If a ball passes its rest position with the speed s,
+the next ball therefore receives
 
 .. math:: s' = \tfrac12 (1 + e) \sqrt{s^2 - \delta^2} \quad\text{after the time}\quad \arcsin(\delta/s).
 
-Impulses between neighbours cancel in the sum, so the centre of mass swings as one pendulum for all time.  Impacts
-reduce the relative motion to about :math:`\delta`.  The five balls then swing together, with a fifth of the amplitude.
+Impulses between neighbours do not move the centre of mass, so it always swings as one pendulum.  Impacts reduce the
+relative motion to about :math:`\delta`.  The five balls then swing together, with a fifth of the amplitude.
 """
 
 # %%
 # Model and run
 # -------------
-# The stop is an event of the link.  Ball i is the one with the smaller number.
+# The stop is an event of the link.  Ball i is the ball with the smaller number.
 import numpy as np
 import sympy as sp
 
@@ -35,7 +35,7 @@ result = sc.run(scene)
 # %%
 # Check
 # -----
-# The first four impacts pass the speed on from ball to ball.  The centre of mass is compared at all times.
+# The speeds after the first four impacts are compared with the formula.  The centre of mass is compared at all times.
 times, speed, time = [], 1.0, np.pi / 2
 for _ in range(4):
     time += np.arcsin(0.01 / speed)
@@ -50,7 +50,7 @@ assert difference < 1e-9
 # %%
 # Figure
 # ------
-# Displacement of each ball, one above the other.
+# The figure shows the displacements of the balls, one above the other.
 import matplotlib.pyplot as plt
 
 _, axes = plt.subplots(figsize=(9, 4), layout="constrained")

@@ -4,14 +4,14 @@ Bursting neurons count the signals that reach them
 
 Belykh, de Lange & Hasler, Physical Review Letters 94, 188101 (2005).
 
-Hindmarsh-Rose neurons (2.8, 1.6, 5, 9, 0.001) send pulses through chemical synapses of the strength g.  Whether their
-synchrony is stable depends on the number k of signals that each neuron receives, and on nothing else of the graph: all
-thresholds of g k are one number.
+Hindmarsh-Rose neurons (2.8, 1.6, 5, 9, 0.001) have chemical synapses of the strength g.  The stability of synchrony
+depends only on the number k of signals that each neuron receives, and not on other properties of the graph.  The
+threshold of g k is therefore one number.
 
-The paper states it of any graph; ours are thresholds of three graphs with one, two and three signals.  At g k = 1.285
-the synchronous motion itself changes, and exponents of the modes jump from 0.1 to below zero, so that the graph hardly
-matters.  Motions of both kinds exist side by side between 1.277 and 1.286: by so much the thresholds differ.  A pair is
-an exception: its only mode decays from g = 1.25 on.
+The paper states this for any graph.  We compute the thresholds of three graphs with one, two and three signals.  At
+g k = 1.285 the synchronous motion itself changes, and the exponents of all modes jump from 0.1 to below zero.  The
+graph therefore has little influence.  Both kinds of motion coexist between 1.277 and 1.286, so the thresholds differ by
+this amount.  A pair is an exception: its only mode decays from g = 1.25 on.
 """
 
 import matplotlib.pyplot as plt

@@ -4,14 +4,14 @@ Between which currents a nerve fires
 
 FitzHugh, Biophysical Journal 1, 445 (1961).
 
-The state of rest of :math:`\dot x = c(y + x - x^3/3 + z),\ \dot y = -(x - a + by)/c` with a = 0.7, b = 0.8 and c = 3
-loses its stability where the trace of the Jacobian is zero, :math:`x^2 = 1 - b/c^2`, at the frequency
-:math:`\sqrt{1 - b^2/c^2}`.  So both currents z between which the nerve fires have a closed form, to which ours are
-compared.
+The equilibrium of :math:`\dot x = c(y + x - x^3/3 + z),\ \dot y = -(x - a + by)/c` with a = 0.7, b = 0.8 and c = 3
+loses its stability if the trace of the Jacobian is zero.  This gives :math:`x^2 = 1 - b/c^2` and the frequency
+:math:`\sqrt{1 - b^2/c^2}`.  The nerve fires between two currents z, which have a closed form.  Our numbers are compared
+with it.
 
-One branch of cycles joins both Hopf points.  It turns at folds outside of them, so that rest and firing exist together
-near both currents.  The equations stay the same under x → -x, y → 2a/b - y, z → -2a/b - z, so that the folds lie at
-equal distances from the Hopf points.
+One branch of cycles joins both Hopf points.  It turns at folds outside of the Hopf points, so rest and firing coexist
+near both currents.  The equations are invariant under x → -x, y → 2a/b - y, z → -2a/b - z, so the folds have equal
+distances from the Hopf points.
 """
 
 import numpy as np

@@ -4,11 +4,11 @@ Rest and rhythm of a column of the cortex
 
 Grimbert & Faugeras, Neural Computation 18, 3052 (2006).
 
-Three populations of neurons make a column (Jansen & Rit, Biological Cybernetics 73, 357 (1995)): pyramidal cells, and
-interneurons that excite and that inhibit them.  The paper follows the state of rest in the input p: it has two folds
-and three Hopf points, and cycles lead from the second Hopf point to the third, the alpha rhythm.
+A column of the cortex has three populations of neurons (Jansen & Rit, Biological Cybernetics 73, 357 (1995)): pyramidal
+cells, excitatory interneurons and inhibitory interneurons.  The paper continues the equilibrium in the input p.  The
+branch has two folds and three Hopf points.  Cycles from the second to the third Hopf point are the alpha rhythm.
 
-The printed numbers are those of AUTO-07p in P. Clusella's tutorial (github.com/pclus/auto-tutorial, *Jansen-Rit*):
+The published numbers are those of AUTO-07p in P. Clusella's tutorial (github.com/pclus/auto-tutorial, *Jansen-Rit*):
 inputs and excitatory potentials of both folds and of the first Hopf point.  All agree to the printed digits.
 """
 
