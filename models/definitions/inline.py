@@ -459,6 +459,10 @@ def _events(
             made.gap.free_symbols & speeds or not made.gap.free_symbols & _reals(coordinates)
         ):
             raise ValueError(f"{what}: {about}: found the gap {made.gap}; expected a function of coordinates and time")
+        if isinstance(made, Friction) and not made.sliding.free_symbols & speeds:
+            raise ValueError(
+                f"{what}: {about}: found the sliding velocity {made.sliding}; expected one with a velocity"
+            )
         if any(e.has(FRICTION) for e in made.expressions):
             raise ValueError(f"{what}: {about}: found friction(…); expected it in the forces Q alone")
         found.append(made)

@@ -19,6 +19,7 @@ from ..inputs.frozen import FrozenDict
 from ..inputs.words import Word
 from ..mechanics.components import WEIGHT_NUMBER
 from ..mechanics.contact import ContactModel
+from ..mechanics.impacts import Stop
 from ..mechanics.oscillator import FieldModel
 from ..mechanics.physics import check_masses, check_power
 from ..networks.layers import as_contact, as_coupling, as_groups, as_law, as_layers, as_oscillator
@@ -111,6 +112,7 @@ def complete(keywords: Mapping[str, Any]) -> dict[str, Any]:
     values["continuation"] = check_sweep(model, values)
     check_draws(model, values, drawn)
     check_friction(model, parameter_values, (*axes, *drawn), values["zipped"])
+    check_restitution(model, parameter_values, (*axes, *drawn))
     check_physics(model, parameter_values, (*axes, *drawn))
     return values
 
@@ -314,6 +316,19 @@ def _numerics(
             "since both ends of the window are included; raise samples"
         )
     return {"integrator": integrator, "rtol": rtol, "atol": atol, "max_steps": max_steps, "samples": samples}
+
+
+def check_restitution(model: Model, parameter_values: Mapping[str, float], axes: Sequence[Axis]) -> None:
+    """Raise ValueError for a parameter as restitution that leaves 0 to 1 in a cell: rebounds would gain energy."""
+    swept = {axis.name: axis.values for axis in axes}
+    for kind, names in at_nodes(model, {name: name for name in parameter_values}):
+        for each in (event for event in getattr(kind.oscillator.model, "events", ()) if isinstance(event, Stop)):
+            name = names.get(str(each.restitution))
+            for e in () if name is None else swept.get(name, (parameter_values[name],)):
+                if not 0.0 <= e <= 1.0:
+                    raise ValueError(
+                        f"stop {each.gap}: found the restitution {name} = {e!r}; expected a number from 0 to 1"
+                    )
 
 
 def check_friction(model: Model, parameter_values: Mapping[str, float], axes: Sequence[Axis], zipped: bool) -> None:

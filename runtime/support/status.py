@@ -46,8 +46,8 @@ _MESSAGES = {
     "integrator = 'dop853'",
     Status.DIVERGED: "the state grew without bound, beyond 2^53 or with steps that shrink so that max_steps will not do, or "
     "became undefined; begin on a bounded motion, such as an equilibrium, or shorten the time",
-    Status.CHATTERING: "a contact changed between stick and slip hundreds of times while no time passed; "
-    "check the friction law",
+    Status.CHATTERING: "a contact, stop or reset changed hundreds of times while no time passed; check friction laws, "
+    "restitutions, and that guards are negative after their resets",
     Status.AMBIGUOUS: "at an event several motions agree with the laws of the contacts, or none does: the load of a contact is "
     "negative, motion leaves a surface on both sides, or stops that feel each other are hit at once; change the model there",
     Status.STOPPED: "met the stop condition of the scene before the end of the window",
