@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from .problem import Problem, Solve
@@ -15,6 +15,20 @@ Tolerances = tuple[tuple[float, float], ...]
 def ladder(first: int, last: int, step: int = 1) -> Tolerances:
     """Return the tolerances 10^-first … 10^-last as pairs (rtol, atol), atol a tenth of rtol."""
     return tuple((float(f"1e-{k}"), float(f"1e-{k + 1}")) for k in range(first, last + 1, step))
+
+
+def absence(package: str, modules: Sequence[str], programs: Sequence[str] = (), fault: Callable[[], str] = str) -> str:
+    """Return why a package cannot run here and what to install, in one line; empty where it can run."""
+    for program in programs:
+        if shutil.which(program) is None:
+            return f"no program {program!r} on the path; install {package}"
+    for module in modules:
+        try:
+            importlib.import_module(module)
+        except (ImportError, OSError) as problem:  # OSError: a shared library that does not load
+            return f"{' '.join(str(problem).split())}; install {package}"
+    found = fault()
+    return f"{found}; install {package}" if found else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,13 +51,4 @@ class Peer:
 
     def absence(self) -> str:
         """Return why the peer cannot run here and what to install, in one line; empty where it can run."""
-        for program in self.programs:
-            if shutil.which(program) is None:
-                return f"no program {program!r} on the path; install {self.package}"
-        for module in self.modules:
-            try:
-                importlib.import_module(module)
-            except (ImportError, OSError) as problem:  # OSError: a shared library that does not load
-                return f"{' '.join(str(problem).split())}; install {self.package}"
-        fault = self.fault()
-        return f"{fault}; install {self.package}" if fault else ""
+        return absence(self.package, self.modules, self.programs, self.fault)
