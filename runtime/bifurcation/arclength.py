@@ -155,7 +155,7 @@ def at_value(problem: BranchProblem, guess: np.ndarray, place: int = -1) -> Poin
 class Limits:
     """How far a branch is followed."""
 
-    bounds: Sequence[tuple[float, float]]  # of each parameter of the problem
+    bounds: Sequence[tuple[float, float]]  # of the last unknowns: each parameter, and the period before them
     most: int  # most solutions
     first_step: float  # lengths in the problem's metric
     largest_step: float
@@ -217,7 +217,7 @@ def _advance(
                     length = float((weights * (after.z - before.z)) @ (weights * before.tangent))
                     turned = after.tangent * math.copysign(1.0, ahead)
                     after = Point(after.z, turned, after.corrections)
-                    end = f"{problem.names[place]} = {bound:.8g}"
+                    end = f"{('period', *problem.names)[place]} = {bound:.8g}"
             if after is not None:
                 critical = problem.critical(after.z)
                 after = Point(after.z, after.tangent, after.corrections, critical, before.length + length)
@@ -237,7 +237,7 @@ def _fits(weights: np.ndarray, before: Point, after: Point, step: float) -> bool
 
 
 def _passed(z: np.ndarray, bounds: Sequence[tuple[float, float]]) -> tuple[int, float] | None:
-    """Return the place and the bound of a parameter that has left its bounds."""
+    """Return the place and the bound of an unknown that has left its bounds."""
     for place, (low, high) in zip(range(-len(bounds), 0), bounds, strict=True):
         if not low <= z[place] <= high:
             return place, low if z[place] < low else high

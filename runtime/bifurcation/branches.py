@@ -29,7 +29,7 @@ from .equilibrium import Equilibrium, resting_equations
 from .kinds import BifurcationKind
 from .normal_forms import first_lyapunov_coefficient
 from .periodic_result import PeriodicOrbit
-from .results import NAMES, Bifurcation, Branch, Curve, digits_of
+from .results import NAMES, Bifurcation, Branch, Curve, Diagram, diagram, digits_of
 from .switching import directions
 
 Direction = Literal["both", "up", "down"]
@@ -58,7 +58,23 @@ def follow(
     direction: Direction = ...,
     largest_step: float | None = ...,
     vector: int = ...,
+    longest_period: float | None = ...,
 ) -> Branch: ...
+
+
+@overload
+def follow(
+    first: Sequence[Equilibrium | PeriodicOrbit | Bifurcation],
+    name: str,
+    *,
+    to: float | None = ...,
+    values: Sequence[float] | np.ndarray | None = ...,
+    within: tuple[float, float] | None = ...,
+    direction: Direction = ...,
+    largest_step: float | None = ...,
+    vector: int = ...,
+    longest_period: float | None = ...,
+) -> Diagram: ...
 
 
 @overload
@@ -73,7 +89,7 @@ def follow(
 
 
 def follow(
-    first: Equilibrium | PeriodicOrbit | Bifurcation,
+    first: Equilibrium | PeriodicOrbit | Bifurcation | Sequence[Equilibrium | PeriodicOrbit | Bifurcation],
     name: str | tuple[str, str],
     *,
     to: float | None = None,
@@ -82,7 +98,8 @@ def follow(
     direction: Direction = "both",
     largest_step: float | None = None,
     vector: int = 0,
-) -> Branch | Curve:
+    longest_period: float | None = None,
+) -> Branch | Curve | Diagram:
     """Follow an equilibrium or a periodic orbit along a parameter, through folds, and locate its bifurcations.
 
     The branch is followed by its arclength: stable and unstable solutions, and both sides of a fold.  It ends on the
@@ -90,8 +107,9 @@ def follow(
 
     Parameters
     ----------
-    first : Equilibrium, PeriodicOrbit or Bifurcation
-        Where the branch begins.  From a branch point the other branch is followed, from a fold both sides.
+    first : Equilibrium, PeriodicOrbit or Bifurcation, or a sequence of them
+        Where the branch begins.  From a branch point the other branch is followed, from a fold both sides.  A sequence,
+        such as `equilibria` returns, gives a diagram with a branch for each.
     name : str or (str, str)
         Name of the parameter; names of two parameters for a curve of folds or Hopf points of equilibria, of folds, period
         doublings or torus points of cycles, or of places where cycles lose synchrony.
@@ -108,10 +126,12 @@ def follow(
         Largest step of the parameter; by default a twentieth of the bounds.
     vector : int
         Which of the vectors of a branch point is followed; see `Bifurcation.vectors`.
+    longest_period : float, optional
+        Period at which a branch of undriven cycles ends: near a homoclinic orbit periods grow without bound.
 
     Returns
     -------
-    Branch or Curve
+    Branch, Curve or Diagram
 
     Warns
     -----
@@ -147,9 +167,14 @@ def follow(
     >>> [(str(each.kind), round(each.value, 9)) for each in branch.bifurcations]
     [('fold', 0.5)]
     """
+    if isinstance(first, list | tuple) and first and isinstance(name, str):
+        options = {"values": values, "within": within, "direction": direction, "largest_step": largest_step}
+        options |= {"to": to, "vector": vector, "longest_period": longest_period}
+        return diagram(*(follow(each, name, **options) for each in first))  # type: ignore[call-overload]
     if not isinstance(first, Equilibrium | PeriodicOrbit | Bifurcation):
         raise TypeError(
-            f"follow: first: found {typed_repr(first)}; expected an Equilibrium, PeriodicOrbit or Bifurcation"
+            f"follow: first: found {typed_repr(first)}; expected an Equilibrium, PeriodicOrbit or Bifurcation, or for one "
+            "parameter a sequence of them"
         )
     if direction not in SIGNS:
         raise ValueError(f"direction: found {direction!r}; expected 'both', 'up' or 'down'")
@@ -178,6 +203,14 @@ def follow(
     size = size or abs(begin) or 1.0
     largest = LARGEST_STEP if largest_step is None else check_number("largest_step", largest_step, 0.0) / size
     limits = Limits((bounds,), MOST, min(FIRST_STEP, largest), largest, requested)
+    if longest_period is not None:
+        is_cycle = isinstance(solution, PeriodicOrbit) and solution.free > 0.0
+        if not is_cycle and not (isinstance(first, Bifurcation) and first.kind is BifurcationKind.HOPF):
+            raise ValueError("longest_period: found solutions without a period of their own; expected undriven cycles")
+        longest = check_number(
+            "longest_period", longest_period, solution.free if isinstance(solution, PeriodicOrbit) else 0.0
+        )
+        limits = replace(limits, bounds=((0.0, longest), bounds))
     if to is not None:
         direction = "up" if to > begin else "down"
     signs = SIGNS[direction]
@@ -287,7 +320,7 @@ def _trace(problem: Equilibria | Cycles, start: Point, limits: Limits) -> Part:
             if found[-1].kind in BORN and each.kind is BifurcationKind.BRANCH_POINT:
                 # The branch is born there; beyond it are the same cycles, shifted in time.
                 return points, found, f"{found[-1].kind} at {problem.names[-1]} = {each.point.value:.8g}"
-    end = str(each)
+    end = f"{each}: homoclinic?" if str(each).startswith("period") else str(each)
     corner = corners.at_end([point for point, _ in points]) if corners and end.startswith("lost") else None
     if corner is not None:
         found.append(_corner(problem, corner))

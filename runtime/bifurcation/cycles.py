@@ -37,8 +37,8 @@ from synchain.models.scenes.scene import Scene
 from ..cells.drive_times import periods
 from ..cells.run_keywords import with_numbers
 from .arclength import Point
-from .equilibrium import Equilibrium
-from .flow import TOLERANCE, Flow, Image, flow_of
+from .equilibrium import Equilibrium, shifted_components
+from .flow import TOLERANCE, Flow, Image, LiftedFlow, flow_of
 from .kinds import BifurcationKind
 from .periodic_result import PeriodicOrbit, sorted_by_size
 from .problems import GrowthNumbers
@@ -70,6 +70,12 @@ birth is located to the square root of rounding (a choice)."""
 NEAR = 1e-3
 """A gap, in units of the motion, from which Newton's method must reduce it in every step under friction (a choice)."""
 
+ORIGIN = 1e-6
+"""Size of an equilibrium, relative to the start of its scene, that counts as zero (a choice)."""
+
+RIGID = 1e-6
+"""Part of the rates across the shifts below which a motion is a rigid rotation (a choice)."""
+
 CLOSE = 1e-9
 """A gap, in units of the motion, at which a step of Newton's method is not halved (a choice)."""
 
@@ -96,6 +102,7 @@ class Cycles:
     spans: np.ndarray  # (q,): the unit of each parameter
     phase: np.ndarray  # (m, n): the direction of the motion at the reference; the unknowns move across it
     transversal: Transversal | None = None
+    shift_names: tuple[str, ...] = ()
     speed: float = math.nan  # size of the rates where the extents were measured
     last: tuple[bytes, Image, np.ndarray] | None = field(default=None, repr=False)
     driven: tuple[tuple[float, ...] | None, float] = field(
@@ -133,7 +140,8 @@ class Cycles:
             scene, tuple(names), tuple(classes), flow, drive_periods, np.zeros(size), np.zeros((size, 0)), point,
             np.ones(size), spans, np.zeros_like(states), Transversal.of(scene, tuple(classes)),
         )  # fmt: skip
-        problem.turns = problem._whole_turns(states, period)
+        distances = problem._find_turns_and_shifts(states, period)
+        problem.point = point = np.insert(point, states.size, distances)
         problem._rescale(point)
         problem._refer(point)
         return problem
@@ -147,7 +155,10 @@ class Cycles:
         copies = expansion(rest.scene.equations, classes, len(vector) * len(set(classes)) // rest.scene.n)
         state, wave = ((copies.T @ each) / copies.sum(axis=0) for each in (rest.state, vector))
         problem = cls.near(rest.scene, (name,), classes, state[None], 2.0 * math.pi / frequency, 0)
-        size = float(np.abs(state).max()) or 1.0
+        size, first = float(np.abs(state).max()), float(np.abs(rest.scene.y0).max())
+        if size <= ORIGIN * first:  # the origin to rounding, which gives no unit
+            size = first
+        size = size or 1.0
         problem.scale = size * np.maximum(np.abs(wave) / np.abs(wave).max(), 1e-3)
         problem.phase = (-wave.imag / problem.scale / np.linalg.norm(wave.imag / problem.scale))[None]
         problem.speed = 0.0
@@ -347,14 +358,24 @@ class Cycles:
         self.last = None
         self.speed = float(np.linalg.norm(self.flow.rates(self.values(z), self.states(z)[:1])[0] / self.scale))
 
-    def _whole_turns(self, states: np.ndarray, period: float) -> np.ndarray:
-        """Return the whole turns of angles by which the motion from the last state differs from the first."""
-        angles = periods_of_states(self.flow.equations)[: self.flow.size]
-        if not any(angles):
-            return np.zeros(self.flow.size)
-        image = self.flow.advance(self.scene.parameters, states[-1:], np.full(1, period / len(states)))[0]
-        gaps = image - states[0]
-        return np.array([0.0 if a is None else a * round(gap / a) for a, gap in zip(angles, gaps, strict=True)])
+    def _find_turns_and_shifts(self, states: np.ndarray, period: float) -> np.ndarray:
+        """Find the shifts and the whole turns of angles in a period; return the distances that the shifts move."""
+        flow, equations, values = self.flow, self.flow.equations, self.scene.parameters
+        angles = periods_of_states(equations)[: flow.size]
+        if not self.periods and isinstance(flow, LiftedFlow) and equations.n > 1 and flow.network.constant_mass:
+            names, shifts = shifted_components(equations, flow.network.at(values), states[0])
+            # A rigid rotation moves along its shifts alone: their conditions would repeat that of the phase.
+            rates = flow.rates(values, states[:1])[0]
+            across = rates - shifts @ (shifts.T @ rates / np.maximum(shifts.sum(axis=0), 1.0))
+            if np.abs(across).max() > RIGID * np.abs(rates).max():
+                self.shift_names, self.shifts = names, shifts
+        if not any(angles) and not self.shifts.size:
+            return np.zeros(0)
+        gaps = flow.advance(values, states[-1:], np.full(1, period / len(states)))[0] - states[0]
+        distances = gaps[self.shifts.argmax(axis=0)] if self.shifts.size else np.zeros(0)
+        gaps -= self.shifts @ distances
+        self.turns = np.array([0.0 if a is None else a * round(gap / a) for a, gap in zip(angles, gaps, strict=True)])
+        return distances
 
     def solved(self) -> tuple[np.ndarray, float, int]:
         """Solve by Newton's method with the parameters fixed: the best point, its largest gap and the number of steps.
@@ -428,6 +449,8 @@ class Cycles:
             critical.values[~along][order], critical.blocks[~along][order],
             () if self.transversal is None else self.transversal.labels,
             "synchronous" if len(self.classes) > 1 and len(set(self.classes)) == 1 else "",
+            self.shift_names,
+            z[self.phase.size : self.phase.size + self.shifts.shape[1]] / self.period(z),
         )  # fmt: skip
 
     # --- stability ---

@@ -11,7 +11,7 @@ Source: Farrell, Birkisson & Funke, SIAM J. Sci. Comput. 37, A2026 (2015), equat
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -87,6 +87,30 @@ class Known:
         return 1.0 / (1.0 - slope) if slope != 1.0 else 1.0
 
 
+class EquilibriumList(tuple[Equilibrium, ...]):
+    """Equilibria that a search found; `stopped` if it ended at the largest number of them, so that more may exist."""
+
+    stopped: bool
+
+    def __new__(cls, equilibria: Iterable[Equilibrium], stopped: bool) -> EquilibriumList:
+        """Make the list."""
+        made = super().__new__(cls, equilibria)
+        made.stopped = stopped
+        return made
+
+    def __reduce__(self) -> tuple[type[EquilibriumList], tuple[tuple[Equilibrium, ...], bool]]:
+        return EquilibriumList, (tuple(self), self.stopped)
+
+    def __repr__(self) -> str:
+        stable = sum(each.stable for each in self)
+        end = (
+            f"the search ended at count = {len(self)}: more may exist"
+            if self.stopped
+            else f"{STARTS} random starts led to no others"
+        )
+        return "\n".join([f"{len(self)} equilibria, {stable} stable; {end}", *(f"  {each.text}" for each in self)])
+
+
 def equilibria(
     scene: Scene,
     count: int = 20,
@@ -95,7 +119,7 @@ def equilibria(
     ranges: Mapping[str, tuple[float, float]] | None = None,
     parameters: Mapping[str, float] | None = None,
     **more: float,
-) -> tuple[Equilibrium, ...]:
+) -> EquilibriumList:
     """Find several equilibria of a network without a drive, stable or not.
 
     Newton's method starts from the scene's start and from random states, with the equilibria that are known deflated.
@@ -119,8 +143,9 @@ def equilibria(
 
     Returns
     -------
-    tuple of Equilibrium
-        In the order in which they were found.  Of equilibria that automorphisms of the graph map to each other there is
+    EquilibriumList
+        A tuple of Equilibrium, in the order in which they were found.  Its field `stopped` is True if the search ended at
+        `count`, so that more may exist.  Of equilibria that automorphisms of the graph map to each other there is
         one; equilibria that differ by whole turns of angles are one.
 
     Raises
@@ -147,7 +172,7 @@ def equilibria(
     count, seed = check_integer("count", count, 1), check_seed("rng", scene.rng if rng is None else rng)
     scene = Given(equilibria, parameters, more, REFUSED).scene(scene)
     network, first = Linearised.of(resting_equations("equilibria", scene), scene.parameters), np.array(scene.y0)
-    names, shifts = shifted_components(scene, network, first)
+    names, shifts = shifted_components(scene.equations, network, first)
     starts, scales = _starts(scene, seed, ranges)
     known = Known(scene, shifts, scales)
     found: list[Equilibrium] = []
@@ -165,8 +190,8 @@ def equilibria(
             known.add(each.state)
             found.append(each)
             if len(found) == count:
-                return tuple(found)
-    return tuple(found)
+                return EquilibriumList(found, stopped=True)
+    return EquilibriumList(found, stopped=False)
 
 
 def _starts(scene: Scene, seed: int, ranges: Mapping[str, tuple[float, float]] | None) -> tuple[np.ndarray, np.ndarray]:

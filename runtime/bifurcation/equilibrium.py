@@ -49,6 +49,10 @@ MOST_STEPS, HALVINGS = 100, 40
 CLOSED = 1e-11
 """Largest rate at an equilibrium, relative to the sizes of its terms: 45 000 rounding errors (a choice)."""
 
+MULTIPLE, REPEATED = 0.2, 3
+"""At a double or higher root each step of Newton's method leaves 1/4 of the rates or more: a root is multiple if each of
+the last REPEATED steps leaves MULTIPLE (choices)."""
+
 TAIL = 0.34
 """Largest factor by which the last step of Newton's method may lower the rates at a root.
 
@@ -122,6 +126,9 @@ class Equilibrium(Labelled):
         Largest rate but for the speeds.
     steps : int
         Steps of Newton's method.
+    multiple : bool
+        Whether the state is a double or higher root of the rates, as at a fold; one eigenvalue is zero there, and does not
+        decide stability.
 
     See Also
     --------
@@ -135,6 +142,7 @@ class Equilibrium(Labelled):
     speeds: np.ndarray
     residual: float
     steps: int
+    multiple: bool = False
 
     @property
     def data(self) -> xr.Dataset:
@@ -159,18 +167,28 @@ class Equilibrium(Labelled):
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Rows of state, eigenvalues, stability, shifts and residual."""
-        names = self.scene.equations.state
-        shown = [f"{name} = {x:.10g}" for name, x in zip(names[:8], self.state[:8], strict=True)]
         largest = [f"{value:.6g}" for value in self.eigenvalues[:6]]
         moves = [f"{name} of all nodes, at the speed {v:.6g}" for name, v in zip(self.shifts, self.speeds, strict=True)]
         return (
             ("scene", scene_text(self.scene)),
-            ("state", ", ".join([*shown, *(["…"] if len(names) > len(shown) else [])])),
+            ("state", self._shown),
             ("eigenvalues", ", ".join([*largest, *(["…"] if len(self.eigenvalues) > len(largest) else [])])),
             ("verdict", self.verdict),
             *((("shifts", "; ".join(moves)),) if moves else ()),
             ("residual", f"{self.residual:.1e} after {self.steps} steps"),
         )
+
+    @property
+    def text(self) -> str:
+        """State and stability in one line."""
+        return f"{self._shown}: {self.verdict}"
+
+    @property
+    def _shown(self) -> str:
+        """The first states."""
+        names = self.scene.equations.state
+        shown = [f"{name} = {x:.10g}" for name, x in zip(names[:8], self.state[:8], strict=True)]
+        return ", ".join([*shown, *(["…"] if len(names) > len(shown) else [])])
 
     @property
     def complete(self) -> bool:
@@ -194,11 +212,13 @@ class Equilibrium(Labelled):
 
     @property
     def verdict(self) -> str:
-        """Stability as text: stable, unstable with the number of growing eigenvalues, neutral, or not decided."""
+        """Stability as text: stable, unstable with the number of growing eigenvalues, neutral, degenerate, or not decided."""
         if self.growing:
             return f"unstable, {'' if self.complete else 'at least '}{self.growing} growing"
         if not self.complete:
             return f"not decided: none of the {len(self.eigenvalues)} eigenvalues nearest to zero grows"
+        if self.multiple:
+            return "degenerate: a double or higher root of the rates, whose zero eigenvalue does not decide stability"
         return f"neutral, {self.neutral} on the imaginary axis" if self.neutral else "stable"
 
     @property
@@ -274,7 +294,7 @@ def equilibrium(
     count = None if count is None else check_integer("count", count, 1)
     if count is not None and count > len(first):
         raise ValueError(f"count = {count}; expected at most {len(first)}, the states of the network")
-    return near(scene, network, first, shifted_components(scene, network, first), count)
+    return near(scene, network, first, shifted_components(scene.equations, network, first), count)
 
 
 def near(
@@ -286,7 +306,7 @@ def near(
 ) -> Equilibrium:
     """Find the equilibrium near a state with `count` eigenvalues; `shifted`: what `shifted_components` returns."""
     names, shifts = shifted
-    state, speeds, residual, steps = _solve(network, first, shifts)
+    state, speeds, residual, search = _solve(network, first, shifts)
     jacobian, blocks = network.jacobian(state), None if count else ModeBlocks.of(scene.equations)
     by_modes = None if blocks is None else blocks.values(jacobian)
     values = eigenvalues(jacobian, network.mass(state), count) if by_modes is None else by_modes[0]
@@ -295,8 +315,10 @@ def near(
         # the terms of a slope may be larger than the slope, as those of x - sin x at 0
         limit = LEAST * _fastest(network.sized(scene.parameters), state)
     values[sizes <= limit] = 0.0
+    if search.multiple:  # the eigenvalue is the square root of a rounding error
+        values[np.argsort(np.abs(values), kind="stable")[len(names)]] = 0.0
     values = values[np.lexsort((-values.imag, -values.real))]
-    return Equilibrium(scene, state, values, names, speeds, residual, steps)
+    return Equilibrium(scene, state, values, names, speeds, residual, search.steps, search.multiple)
 
 
 def resting_equations(function: str, scene: Scene) -> Equations:
@@ -341,9 +363,11 @@ def _fastest(network: Linearised, *states: np.ndarray) -> float:
     return max(sizes)
 
 
-def shifted_components(scene: Scene, network: Linearised, state: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
+def shifted_components(
+    equations: Equations, network: Linearised, state: np.ndarray
+) -> tuple[tuple[str, ...], np.ndarray]:
     """Find components that can be shifted at all nodes together, and the vectors of ones (states, shifts) along them."""
-    equations, jacobian, rates = scene.equations, network.jacobian(state), network.rates(state)
+    jacobian, rates = network.jacobian(state), network.rates(state)
     # Row sums of |J|, the larger of those at the state and beside it.
     here, beside = abs(_jacobian(network, state)), abs(network.jacobian((1.0 + BESIDE) * state))
     here, beside = here.sum(axis=1), beside.sum(axis=1)
@@ -379,6 +403,7 @@ class Search:
     speeds: np.ndarray  # (shifts,)
     scales: np.ndarray  # (states,): sizes of the rates, by which their squares are weighted
     steps: int = 0
+    multiple: bool = False  # whether Newton's method ended at a multiple root
 
     @classmethod
     def begin(cls, network: Linearised, state: np.ndarray, shifts: np.ndarray) -> Search:
@@ -467,6 +492,8 @@ class Search:
         # (TAIL).
         last = int(np.argmax(np.all((gaps <= limits)[:, closed], axis=1)))
         levels = (gaps / np.where(limit > 0.0, limit, np.inf))[:, closed].max(axis=1, initial=0.0)
+        end = levels[max(0, last - REPEATED) : last + 1]
+        self.multiple = len(end) > REPEATED and bool(np.all(end[1:] > MULTIPLE * end[:-1]))
         return last == 0 or bool(levels[last] <= TAIL * levels[last - 1])
 
     def relax(self) -> None:
@@ -487,8 +514,8 @@ class Search:
             rate *= ratio  # switched evolution relaxation: h grows as 1/|r| (Kelley & Keyes)
 
 
-def _solve(network: Linearised, first: np.ndarray, shifts: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, int]:
-    """Return the state at equilibrium near a first one, its speeds along the shifts, the residual and the steps."""
+def _solve(network: Linearised, first: np.ndarray, shifts: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, Search]:
+    """Return the state at equilibrium near a first one, its speeds along the shifts, the residual and the search."""
     search = Search.begin(network, first, shifts)
     if not search.newton():
         failed, search = search, Search.begin(network, first, shifts)
@@ -502,7 +529,7 @@ def _solve(network: Linearised, first: np.ndarray, shifts: np.ndarray) -> tuple[
     terms = network.term_sizes(search.state) + np.abs(shifts @ search.speeds)
     speeds = np.where(np.abs(search.speeds) > EVEN * terms.max(), search.speeds, 0.0)
     residual = float(np.abs(search.left(search.state, search.speeds)).max())
-    return search.state, speeds, residual, search.steps
+    return search.state, speeds, residual, search
 
 
 def _solve_linear(matrix: sparse.csc_array, right: np.ndarray) -> np.ndarray:

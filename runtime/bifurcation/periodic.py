@@ -329,7 +329,10 @@ def _described(problem: Cycles, orbit: PeriodicOrbit, z: np.ndarray) -> Periodic
     if scene.n == 1 or scene.equations.mixed:
         return orbit
     looks = LOOKS if scene.n < MANY else FEWER_LOOKS
-    motion = problem.orbit_states(z, looks) @ expansion(scene.equations, orbit.classes, problem.flow.size).T
+    # In the frame that moves with the shifts.
+    distances = z[problem.phase.size : problem.phase.size + problem.shifts.shape[1]]
+    frame = np.outer(np.arange(looks * problem.segments) / (looks * problem.segments), problem.shifts @ distances)
+    motion = (problem.orbit_states(z, looks) - frame) @ expansion(scene.equations, orbit.classes, problem.flow.size).T
     return replace(orbit, pattern=pattern_of(motion.reshape(looks, -1, scene.n), [*map(str, scene.topology.labels)]))
 
 

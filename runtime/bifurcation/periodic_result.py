@@ -64,6 +64,11 @@ class PeriodicOrbit(Labelled):
         The blocks: the modes of the graph by their eigenvalues if all nodes move alike.
     pattern : str
         How the nodes move: "synchronous", "travelling wave …", "antiphase …", "clusters …"; empty if none of these.
+    shifts : tuple of str
+        Coordinates that can be shifted at all nodes together, so that the orbit closes in a moving frame.  Each makes one
+        multiplier 1.
+    speeds : ndarray, shape (shifts,)
+        Mean speeds of the frame, those of the first node.
 
     See Also
     --------
@@ -83,6 +88,8 @@ class PeriodicOrbit(Labelled):
     blocks: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     modes: tuple[str, ...] = ()
     pattern: str = ""
+    shifts: tuple[str, ...] = ()
+    speeds: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def period(self) -> float:
@@ -135,25 +142,42 @@ class PeriodicOrbit(Labelled):
             ("multipliers", _listed(self.multipliers)),
             *((("across", _listed(self.across[np.argsort(-np.abs(self.across))])),) if len(self.across) else ()),
             ("verdict", self.verdict),
+            *(
+                (
+                    (
+                        "frame",
+                        ", ".join(
+                            f"{s} of all nodes at the mean speed {v:.10g}"
+                            for s, v in zip(self.shifts, self.speeds, strict=True)
+                        ),
+                    ),
+                )
+                if self.shifts
+                else ()
+            ),
             ("residual", f"{self.residual:.1e} after {self.steps} steps"),
         )
 
     @property
     def stable(self) -> bool:
-        """True if all multipliers lie inside the unit circle, but for the 1 of a shift along the orbit."""
+        """True if all multipliers lie inside the unit circle, but for the 1 of the motion and those of the shifts."""
         return self.stable_along and bool(np.all(np.abs(self.across) < 1.0))
 
     @property
     def stable_along(self) -> bool:
         """True if the orbit is stable as long as clusters stay together."""
-        shift = [int(np.abs(self.multipliers - 1.0).argmin())] if self.free else []
-        return bool(np.all(np.abs(np.delete(self.multipliers, shift)) < 1.0))
+        return bool(np.all(np.abs(self._others) < 1.0))
 
     @property
     def growing(self) -> int:
         """Number of multipliers outside the unit circle, of differences within clusters too."""
-        shift = [int(np.abs(self.multipliers - 1.0).argmin())] if self.free else []
-        return int((np.abs(np.append(np.delete(self.multipliers, shift), self.across)) > 1.0).sum())
+        return int((np.abs(np.append(self._others, self.across)) > 1.0).sum())
+
+    @property
+    def _others(self) -> np.ndarray:
+        """The multipliers along the orbit without those that are always 1: of the motion itself, and of the shifts."""
+        neutral = len(self.shifts) + (self.free > 0.0)
+        return np.delete(self.multipliers, np.argsort(np.abs(self.multipliers - 1.0), kind="stable")[:neutral])
 
     @property
     def verdict(self) -> str:

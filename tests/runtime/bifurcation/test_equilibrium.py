@@ -319,3 +319,22 @@ def test_eigenvalues_do_not_depend_on_the_slopes_at_the_start() -> None:
     assert well.stable
     flat = sc.equilibrium(sc.Scene(sc.Field({"x": "x - sin(x)"}), None, initial={"x": 1.0}))
     assert flat.neutral == 1
+
+
+@pytest.mark.parametrize(
+    ("rates", "multiple"),
+    [
+        ({"x": "1 - exp(x - 1) + x - 1"}, True),
+        ({"x": "(x - 1)**3"}, True),
+        ({"x": "3*(x - 1)**2 - y", "y": "-y"}, True),
+        ({"x": "(x - 1)**2 - y", "y": "x - 1 - 3*y"}, False),
+        ({"x": "x - x**3"}, False),
+    ],
+)
+def test_a_double_root_is_called_degenerate(rates: dict[str, str], multiple: bool) -> None:
+    """Its eigenvalue is zero, of which Newton's method leaves the square root of a rounding error."""
+    rest = sc.equilibrium(sc.Scene(sc.Field(rates), None, initial={name: 0.5 for name in rates}))
+    assert rest.multiple == multiple
+    assert ("degenerate: a double or higher root" in rest.verdict) == multiple
+    assert np.any(rest.eigenvalues == 0.0) == multiple
+    assert rest.stable != multiple

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -242,7 +243,13 @@ def test_equilibria_of_machines_differ_by_more_than_turns_and_shifts() -> None:
     apart = sorted(abs(np.sin(each.state[0] - each.state[1])) for each in found)
     np.testing.assert_allclose(apart, [0.5, 0.5], atol=1e-12)
     assert sorted(each.stable for each in found) == [False, True]
-    assert len(sc.equilibria(pair, 1)) == 1
+    assert not found.stopped
+    assert str(found).startswith("2 equilibria, 1 stable; 40 random starts led to no others")
+    first = sc.equilibria(pair, 1)
+    assert len(first) == 1
+    assert first.stopped
+    assert str(first).splitlines()[0].endswith("the search ended at count = 1: more may exist")
+    assert pickle.loads(pickle.dumps(first)).stopped
     with pytest.raises(ValueError, match="equilibria: the range of delta is"):
         sc.equilibria(pair, ranges={"delta": (1, 0)})
 

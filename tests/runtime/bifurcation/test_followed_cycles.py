@@ -350,3 +350,51 @@ def test_the_cycles_of_three_genes_lead_from_the_hopf_point_to_large_strengths()
     last = sc.follow(hopf, "a", to=200.0)[-1]
     assert last.period == pytest.approx(9.440954865983308, abs=1e-11)
     assert last.multipliers[1].real == pytest.approx(0.11661576173674, abs=1e-11)
+
+
+def test_a_branch_of_cycles_ends_at_the_longest_period() -> None:
+    """Cycles that are born at m = 0 grow into a homoclinic orbit (Kuznetsov, section 8.4)."""
+    node = sc.Field({"x": "y", "y": "m + n*x + x**2 - x*y"}, parameters={"m": -0.3, "n": -1})
+    rest = sc.equilibrium(sc.Scene(node, None, initial={"x": -0.5, "y": 0}))
+    (hopf,) = sc.follow(rest, "m", within=(-1, 0.1)).points["Hopf"]
+    cycles = sc.follow(hopf, "m", within=(-1, 1), longest_period=12.0)
+    assert cycles[-1].period == 12.0
+    assert cycles.ends == ("period = 12: homoclinic?",)
+    assert not cycles.bifurcations
+    assert np.all(np.diff(cycles.values[-5:]) < 0)
+    with pytest.raises(ValueError, match="longest_period: found solutions without a period of their own"):
+        sc.follow(rest, "m", to=0, longest_period=3.0)
+
+
+def test_rotors_that_turn_at_different_speeds_close_in_a_moving_frame() -> None:
+    """The difference D of two rotors obeys D'' = P_1 - P_2 - g D' - 2 K sin D; their mean speed is (P_1 + P_2)/(2 g)."""
+    difference = sc.Field({"D": "w", "w": "1.4 - g*w - 2*K*sin(D)"}, parameters={"g": 0.2, "K": 0.3})
+    one = sc.periodic_orbit(sc.Scene(difference, initial={"D": 0, "w": 7}), start=[0.0, 7.0], period=0.9)
+    node = sc.Field({"d": "w", "w": "P - g*w"}, parameters={"P": 0, "g": 0.2})
+    line = sc.Rates({"w": "K*W*sin(d_j - d_i)"}, {"K": 0.3})
+    two = sc.Scene(node, line, sc.graphs.chain(2), parameters={"P": [1.0, -0.4]}, initial={"d": 0, "w": 0})
+    orbit = sc.periodic_orbit(two, start=[0, 0, 5, -2], period=0.9)
+    assert orbit.period == pytest.approx(one.period, rel=1e-12)
+    assert orbit.shifts == ("d",)
+    assert orbit.speeds[0] == pytest.approx(1.5 + math.pi / orbit.period, rel=1e-12)
+    decay = math.exp(-0.2 * orbit.period)
+    np.testing.assert_allclose(orbit.multipliers, [1, 1, decay, decay], atol=1e-11)
+    assert orbit.stable
+    assert "frame        d of all nodes at the mean speed 4.99973" in str(orbit)
+    branch = sc.follow(orbit, "K", to=0.5)
+    assert branch[-1].period == pytest.approx(sc.periodic_orbit(one.scene, start=one.state, period=0.9, K=0.5).period)
+
+
+def test_several_solutions_are_followed_at_once() -> None:
+    """Of the equilibria of two bistable cells at m = 0 two pairs meet in folds."""
+    cell = sc.Field({"x": "x - x**3 + m"}, parameters={"m": 0})
+    link = sc.Rates({"x": "K*W*(x_j - x_i)"}, {"K": 0.2})
+    scene = sc.Scene(cell, link, sc.graphs.chain(2), initial={"x": 1})
+    found = sc.equilibria(scene)
+    branches = sc.follow(found, "m", to=0.1)
+    assert len(branches) == len(found) == 6
+    alone = sc.follow(found[1], "m", to=0.1)
+    np.testing.assert_array_equal(branches[1].values, alone.values)
+    assert [len(each.points["fold"]) for each in branches] == [0, 1, 1, 0, 0, 0]
+    with pytest.raises(TypeError, match="for one parameter a sequence of them"):
+        sc.follow([], "m", to=1.0)
