@@ -40,6 +40,9 @@ SIGNS: Mapping[str, tuple[float, ...]] = {"both": (-1.0, 1.0), "up": (1.0,), "do
 Part = tuple[list[tuple[Point, Equilibrium | PeriodicOrbit]], list[Bifurcation], str]
 """The points of a branch in one direction with their solutions, the bifurcations, and how it ends."""
 
+SAME_GRAZE = 1e-5
+"""Two grazes at the end of a branch that are nearer to each other are one (a choice)."""
+
 BORN = (BifurcationKind.HOPF, BifurcationKind.PERIOD_DOUBLING)
 """Where cycles are born."""
 
@@ -189,11 +192,6 @@ def follow(
     solution = first.solution if isinstance(first, Bifurcation) else first
     scene = solution.scene
     _check_name(scene, name)
-    if scene.equations.has_rows and not isinstance(first, Equilibrium):
-        raise ValueError(
-            "follow: found stops, resets, surfaces, several contacts or moving grounds; expected friction of one coordinate on "
-            "a ground of constant velocity; find single orbits with periodic_orbit"
-        )
     bounds, requested = _bounds(scene, name, to, values, within)
     begin = scene.parameters[name]
     # The range of the parameter is its unit of length.
@@ -323,8 +321,13 @@ def _trace(problem: Equilibria | Cycles, start: Point, limits: Limits) -> Part:
     end = f"{each}: homoclinic?" if str(each).startswith("period") else str(each)
     corner = corners.at_end([point for point, _ in points]) if corners and end.startswith("lost") else None
     if corner is not None:
-        found.append(_corner(problem, corner))
+        last = [each for each in found if each.kind is BifurcationKind.GRAZING][-1:]
+        if not last or abs(last[0].length - corner.point.length) > SAME_GRAZE:
+            found.append(_corner(problem, corner))
         end = f"grazing at {problem.names[-1]} = {corner.point.value:.8g}"
+    elif corners and end.startswith("lost") and corners.event_at_start([point for point, _ in points]):
+        at = f"{problem.names[-1]} = {points[-1][0].value:.8g}"
+        end = f"an event at the beginning of a period at {at}, where the state jumps; shift the drive in time"
     return points, found, end
 
 

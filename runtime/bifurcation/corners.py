@@ -19,7 +19,7 @@ from .arclength import Point
 from .cycles import Cycles
 from .detection import BranchStep, bifurcations
 from .kinds import BifurcationKind
-from .phases import Phases, phases_of
+from .phases import Phases, RowPhases, phases_of
 from .problems import BranchProblem
 
 APART = 1.0 / 64.0
@@ -31,6 +31,9 @@ SHUT, SHARE, MOST_STEPS = 1e-13, 1.0 / 16.0, 80
 CLOSING = 1e-6
 """Largest gap of the last orbit of a branch that ends in a graze (a choice)."""
 
+
+EARLY = 1e-4
+"""An event this near to the beginning of a cycle, in cycles, ends a branch there (a choice)."""
 
 MOVE = 0.75
 """Largest distance that a multiplier moves in a step, relative to its modulus if that exceeds 1 (a choice): a step that
@@ -105,6 +108,9 @@ class Corners:
             at = float(brentq(lambda h: self.phases(step.at(h)).landing, 0.0, step.length, xtol=1e-14 * step.length))
             point = step.at(at)
             return Corner(BifurcationKind.STICK_LOSS, point, abs(self.phases(point).landing)), at, at
+        if isinstance(one, RowPhases) and isinstance(other, RowPhases) and one.crossings == other.crossings:
+            at = self._bisected(step, one)
+            return Corner(BifurcationKind.STICK_LOSS, step.at(at), 0.0), at, at
         ahead = len(one.slip_states) <= len(other.slip_states)
         near, far = (0.0, step.length) if ahead else (step.length, 0.0)
         side, gaps = self.phases(step.at(near)).slip_states, [(near, self.phases(step.at(near)).gap)]
@@ -123,13 +129,28 @@ class Corners:
                 gaps.append((at, phases.gap))
             else:
                 far = at
+        if isinstance(one, RowPhases) and not abs(gaps[-1][1]) < CLOSING:
+            raise ArithmeticError("events change, but no gap closes")
         corner = Corner(BifurcationKind.GRAZING, step.at(near), abs(gaps[-1][1]))
         return (corner, near, far) if ahead else (corner, far, near)
+
+    def _bisected(self, step: BranchStep, one: Phases) -> float:
+        """Return the distance at which the phases are those of the beginning no longer."""
+        near, far = 0.0, step.length
+        while far - near > 1e-13 * step.length:
+            at = 0.5 * (near + far)
+            near, far = (at, far) if self.phases(step.at(at)).slip_states == one.slip_states else (near, at)
+        return near
 
     def at_end(self, points: list[Point]) -> Corner | None:
         """Return the graze at which a branch ends; None if the gap of its last orbit is open."""
         gap = self.phases(points[-1]).gap
         return Corner(BifurcationKind.GRAZING, points[-1], abs(gap)) if abs(gap) < CLOSING else None
+
+    def event_at_start(self, points: list[Point]) -> bool:
+        """Return True if an event meets the beginning of the cycle, where the state jumps along the branch."""
+        phases = self.phases(points[-1])
+        return isinstance(phases, RowPhases) and phases.early < EARLY
 
 
 def _same_slips(before: Phases, after: Phases) -> bool:

@@ -204,8 +204,8 @@ class PeriodicOrbit(Labelled):
 
     @property
     def phases(self) -> Phases | None:
-        """Phases of stick and slip of one cycle of nodes that move alike; None without such friction on one coordinate."""
-        if len(set(self.classes)) > 1 or not self.scene.equations.sticks or self.scene.equations.has_rows:
+        """Phases of stick and slip, or events, of one cycle of nodes that move alike; None without events."""
+        if len(set(self.classes)) > 1 or not self.scene.equations.sticks:
             return None
         lone = self.scene.lone
         return phases_of(lone, lone.parameters, self.state[:: self.scene.n], self.period)

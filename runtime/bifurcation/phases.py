@@ -27,11 +27,16 @@ from numpy.polynomial import Polynomial
 
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.events import Event
+from synchain.models.mechanics.rows import Law, Row
 from synchain.models.scenes.scene import Scene
 
 from ..cells.run_keywords import ONE_CELL, with_numbers
+from ..results.result import Result
 from ..sweeps.run import run
 from .flow import TOLERANCE
+
+Function = Callable[..., np.ndarray]
+"""A function of arrays."""
 
 SAMPLES = 2000
 """Samples in each period of the drive (a choice)."""
@@ -55,25 +60,105 @@ class Phases:
         return ", ".join({0: "stick", 1: "slip +", -1: "slip -"}[mode] for mode in self.slip_states)
 
 
-def phases_of(scene: Scene, values: Mapping[str, float], state: np.ndarray, period: float) -> Phases | None:
-    """Determine the phases of a periodic orbit of one oscillator at some parameters. Shapes: state (components,)."""
-    events = scene.equations.node.events
-    if not events:
-        return None
+@dataclass(frozen=True, slots=True)
+class RowPhases(Phases):
+    """Events of one cycle of a node with rows: `slip_states` holds 16 times the row, and the modes before and after."""
+
+    names: tuple[str, ...] = ()  # of the rows
+    early: float = math.inf  # time between an event and the beginning of the cycle, as a part of the cycle
+
+    @property
+    def words(self) -> str:
+        """The events as text, for example "impact 1, slip_x held"."""
+        return ", ".join(f"{self.names[row]} {_MEANINGS[before, after]}" for row, before, after in self._events)
+
+    @property
+    def crossings(self) -> tuple[tuple[int, int, int], ...]:
+        """The events without stays on a surface that is left on the other side."""
+        events = list(self._events)
+        for k, (row, before, _) in enumerate(self._events):
+            later = next((each for each in (*self._events[k + 1 :], *self._events[:k]) if each[0] == row), None)
+            if self._events[k][2] == 0 and later is not None and later[2] == -before:
+                events[events.index(self._events[k])] = (row, before, -before)
+                events.remove(later)
+        return min((tuple(events[k:] + events[:k]) for k in range(len(events))), default=())
+
+    @property
+    def _events(self) -> tuple[tuple[int, int, int], ...]:
+        return tuple((code // 16, code % 16 // 4 - 1, code % 4 - 1) for code in self.slip_states)
+
+
+_MEANINGS = {(1, 1): "jumps", (1, 0): "held", (-1, 0): "held", (0, 1): "released", (0, -1): "released", (1, -1): "crossed",
+             (-1, 1): "crossed", (0, 0): "held", (-1, -1): "jumps"}  # fmt: skip
+
+
+def _cycle_of(
+    scene: Scene, values: Mapping[str, float], state: np.ndarray, period: float, record: tuple[str, ...]
+) -> Result:
+    """Run one cycle, sampled SAMPLES times in each period of the drive; the last sample is the first one again."""
     samples = SAMPLES * max(1, round(period / (scene.period or period)))
+    names = [s.name for s in scene.equations.node.continuous]
     single = with_numbers(
         scene,
         values,
-        **{**ONE_CELL, "record": ("trajectory",)},
+        **{**ONE_CELL, "record": record},
         samples=samples + 1,
         transient=0.0,
         window=period,
         time_unit="time",
-        initial={"x": float(state[0]), "v": float(state[1])},
+        initial=dict(zip(names, map(float, state), strict=True)),
         rtol=TOLERANCE,
         atol=None,
     )
-    once = np.asarray(run(single, show_progress=False, workers=1).trajectory.sel(node=1).values, dtype=float)[:-1]
+    return run(single, show_progress=False, workers=1)
+
+
+def _phases_of_rows(scene: Scene, values: Mapping[str, float], state: np.ndarray, period: float) -> RowPhases:
+    """Return the events of a cycle, and the least minimum of the gaps of all rows between events."""
+    result = _cycle_of(scene, values, state, period, ("trajectory", "events"))
+    path = np.asarray(result.trajectory.sel(node=1).values, dtype=float)[:-1]
+    node, t, numbers = scene.equations.node, np.arange(len(path)) * (period / len(path)), {**scene.parameters, **values}
+    margins = [
+        np.broadcast_to(function(*path.T, t, *numbers.values()), t.shape)
+        for function in _row_gaps(node.rows, tuple(node.state), tuple(numbers))
+    ]
+    table = np.array([np.ravel(result.events[f"event_{name}"].values) for name in ("time", "row", "before", "after")])
+    events = table[:, np.isfinite(table[0])]
+    codes = np.round(16 * (events[1] - 1) + 4 * (events[2] + 1) + events[3] + 1).astype(int).tolist()
+    # the samples between events, beginning after the first one
+    ends = np.unique(np.searchsorted(t, events[0]) % len(t))
+    first = int(ends[0]) if len(ends) else 0
+    gaps = [math.inf]
+    for margin in margins:
+        rolled = np.roll(margin, -first)
+        if not len(ends):
+            rolled = np.concatenate([rolled[-1:], rolled, rolled[:1]])
+        gaps += [_least_minimum(part) for part in np.split(rolled, (ends - first)[1:])]
+    rotations = (tuple(codes[k:] + codes[:k]) for k in range(len(codes)))
+    modes = iter(node.modes)
+    names = tuple("guard" if row.law is Law.RESET else str(next(modes)) for row in node.rows)
+    early = np.minimum(events[0], period - events[0]).min(initial=math.inf) / period
+    return RowPhases(min(rotations, default=()), min(gaps), math.inf, names, float(early))
+
+
+@lru_cache(maxsize=16)
+def _row_gaps(rows: tuple[Row, ...], state: tuple[sp.Symbol, ...], names: tuple[str, ...]) -> tuple[Function, ...]:
+    """Compile the gaps of all rows as functions of state, time and parameters."""
+    symbols = [*state, TIME, *(sp.Symbol(name, real=True) for name in names)]
+    return tuple(sp.lambdify(symbols, gap, "numpy") for row in rows for gap in row.gaps)
+
+
+def phases_of(scene: Scene, values: Mapping[str, float], state: np.ndarray, period: float) -> Phases | None:
+    """Determine the phases of a periodic orbit of one oscillator at some parameters. Shapes: state (components,)."""
+    if scene.equations.has_rows:
+        return _phases_of_rows(scene, values, state, period)
+    events = scene.equations.node.events
+    if not events:
+        return None
+    samples = SAMPLES * max(1, round(period / (scene.period or period)))
+    single = with_numbers(scene, values)
+    result = _cycle_of(scene, values, state, period, ("trajectory",))
+    once = np.asarray(result.trajectory.sel(node=1).values, dtype=float)[:-1]
     # Two cycles, so that each phase is complete in one of them: path (2 cycle, components x, v, slip).
     path = np.concatenate([once, once])
     t, slip = np.arange(len(path)) * (period / samples), np.round(path[:, 2]).astype(int)
@@ -95,10 +180,6 @@ def phases_of(scene: Scene, values: Mapping[str, float], state: np.ndarray, peri
                 slip_states.append(0)  # it sticks for less than the distance of two samples
     first_rotation = min(tuple(slip_states[k:] + slip_states[:k]) for k in range(len(slip_states)))
     return Phases(first_rotation, min(gaps), min(landings, key=abs))
-
-
-Function = Callable[..., np.ndarray]
-"""A function of arrays."""
 
 
 def _margins(scene: Scene, event: Event) -> tuple[Function, Function]:
