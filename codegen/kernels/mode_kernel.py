@@ -36,7 +36,10 @@ from ..steps.unrolled_step import UnrolledStep, stage_state
 from ..taylor import write_tangent
 from .driver import Driver, KernelKind
 from .kernel_text import KernelSource, NamedEquations, describe, module
-from .sweep_kernel import AUTO, LARGEST_UNROLLED, node_functions
+from .sweep_kernel import AUTO, node_functions
+
+LARGEST_ORBIT = 32
+"""Most nodes of an orbit; compilation takes about a second of CPU time for each (a choice)."""
 
 HEAD = 3
 """Number of entries at the beginning of the shared array: rate = 1/h, shift = 1/(gamma h), reach = gamma h."""
@@ -82,9 +85,9 @@ class ModeKernel(KernelSource):
 def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int | None = None) -> ModeKernel:
     """Write the kernel that integrates deviations along an orbit."""
     equations = variation.orbit
-    if equations.n > LARGEST_UNROLLED:
+    if equations.n > LARGEST_ORBIT:
         raise ValueError(
-            f"tangent dynamics of {equations.n} oscillators; expected at most {LARGEST_UNROLLED} (steps are written out)"
+            f"tangent dynamics: found {equations.n} oscillators or clusters; expected at most {LARGEST_ORBIT}, as steps are written out"
         )
     method = integrator(method) if isinstance(method, str) else method
     if not (method.series or method.implicit):

@@ -196,7 +196,7 @@ def cluster_exponents(
     Parameters
     ----------
     scene : Scene
-        Network of at most eight clusters with its coupling strength.
+        Network of at most 32 clusters with its coupling strength.
     state : Clusters or sequence of int
         Partition of the nodes, from `clusters` or as the cluster of each node. All nodes of a cluster are of one kind
         and have equal parameters. Each cluster starts from the state of its first node. The partition into a single
@@ -217,7 +217,7 @@ def cluster_exponents(
     ------
     ValueError
         If the partition is not balanced or belongs to another graph, if nodes of a cluster differ, if
-        links are not proportional to their weights or differ in a parameter, if there are more than eight
+        links are not proportional to their weights or differ in a parameter, if there are more than 32
         clusters, or if time enters in the equations without a known period.
     FloatingPointError
         If the integration fails.

@@ -191,7 +191,7 @@ def lyapunov_spectrum(
     Parameters
     ----------
     scene : Scene
-        Network of any size; of at most eight oscillators with set-valued friction.
+        Network of any size; of at most 32 oscillators with set-valued friction.
     count : int, optional
         Number of largest exponents; all by default.
     {average}

@@ -94,7 +94,8 @@ class TangentFrame:
         size = sum(len(equations.nodes[kind].continuous) for kind in equations.kind_of)
         basis = np.linalg.qr(np.random.default_rng(seed).normal(size=(size, count)))[0]
         alike = len(equations.nodes) == 1 and not equations.inertial
-        if alike and equations.n <= LARGEST_UNROLLED:
+        # lifted networks are faster above LARGEST_UNROLLED nodes, but have no saltation
+        if alike and (equations.n <= LARGEST_UNROLLED or equations.sticks):
             return cls._of_modes(scene, equations, basis)
         return cls._of_lift(scene, equations, basis)
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from synchain.codegen.kernels.mode_kernel import LARGEST_ORBIT
 from synchain.models.graphs.topology import Topology
 from synchain.models.inputs.checks import check_number, check_seed
 from synchain.models.scenes.scene import Scene, check_scene
@@ -41,9 +42,6 @@ SHORT = 16
 
 LISTED = 12
 """Most nodes of a cluster that a summary lists; of more, it writes their number (a choice)."""
-
-MOST_CLUSTERS = 8
-"""Most clusters of a state whose exponents `cluster_exponents` computes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,8 +252,8 @@ class Transition(Labelled):
         remarks = []
         for k, step in enumerate(steps):
             remarks.append(step.imbalance and f"no such state: {step.imbalance}")
-            if max(step.state) >= MOST_CLUSTERS:
-                remarks[-1] = f"{max(step.state) + 1} clusters; exponents are computed for at most {MOST_CLUSTERS}"
+            if max(step.state) >= LARGEST_ORBIT:
+                remarks[-1] = f"{max(step.state) + 1} clusters; exponents are computed for at most {LARGEST_ORBIT}"
             if remarks[-1]:
                 continue
             sides: list[ClusterExponents] = []

@@ -174,5 +174,5 @@ def test_what_a_variation_refuses() -> None:
 
 
 def test_large_networks_are_refused_in_words() -> None:
-    with pytest.raises(ValueError, match="tangent dynamics of 9 oscillators; expected at most 8"):
-        emit_modes(network_variation(Scene(topology=topology("chain", 9)).equations))
+    with pytest.raises(ValueError, match="tangent dynamics: found 33 oscillators or clusters; expected at most 32"):
+        emit_modes(network_variation(Scene(topology=topology("chain", 33)).equations))

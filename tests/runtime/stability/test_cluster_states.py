@@ -293,6 +293,16 @@ def test_linear_kinds_have_the_eigenvalues_of_the_network() -> None:
 
 
 @pytest.mark.filterwarnings("ignore:coupling")
+def test_ten_clusters_have_the_exponents_of_half_a_chain() -> None:
+    """Differences of mirror images in a chain of linear nodes: eigenvalues of J + sigma G on odd vectors."""
+    node, graph = Field({"x": "-x/5 + y", "y": "-x - y/10"}), topology("chain", 20)
+    scene = Scene(node, Rates({"x": "k*W*(y_j - y_i)"}, {"k": 0.1}), graph, initial={"x": 1.0, "y": 0.5})
+    result = cluster_exponents(scene, [min(i, 19 - i) for i in range(20)], transient=50, periods=500)
+    modes = [value for k, value in enumerate(sorted(graph.spectrum.values, reverse=True)) if k % 2]
+    expected = max(np.linalg.eigvals([[-0.2, 1.0 + 0.1 * value], [-1.0, -0.1]]).real.max() for value in modes)
+    assert result.exponent[0] == pytest.approx(expected, abs=2e-3)
+
+
 def test_links_without_a_sum_of_weights_are_refused() -> None:
     equations = damped(PAIR, 0.1).equations
     with pytest.raises(ValueError, match="these equations have no coupling"):

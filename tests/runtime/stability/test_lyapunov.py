@@ -132,6 +132,15 @@ def test_friction_leaves_as_many_exponents_as_oscillators_and_says_what_the_rest
     assert first.exponent[0] == pytest.approx(expected.max(), abs=2e-3)
 
 
+def test_set_valued_friction_of_ten_oscillators_has_the_exponents_of_its_modes() -> None:
+    """All to all, synchronous, in stick once a period: one exponent of the mode alpha = 0, nine of alpha = 10 sigma."""
+    scene = Scene(topology=topology("complete", 10), contact="set-valued", parameters={"omega": 1.15, "sigma": 0.02})
+    found = lyapunov_spectrum(scene, count=10, transient=100, periods=64, show_progress=False)
+    expected = exponents(scene, [0.0, 0.2], starts=1).exponent
+    assert expected.max() < 0.0
+    np.testing.assert_allclose(found.exponent, np.sort(expected[[0] + [1] * 9])[::-1], atol=2e-3)
+
+
 def test_the_log_of_a_volume_grows_by_the_divergence_of_the_network() -> None:
     equations = Scene(oscillator="lorenz", coupling="y->y, x->z", topology=topology("star", 4)).equations
     extended = with_volume(equations)

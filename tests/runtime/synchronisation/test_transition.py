@@ -164,9 +164,12 @@ def test_a_wrong_step_is_not_confirmed(lorenz):
 
 
 def test_states_without_exponents_are_named():
-    many = sequence(ELEVEN, top=8.0).verify(periods=2, transient=0)
-    assert many.verdicts[0] == "not computed"
-    assert many.remarks[0] == "10 clusters; exponents are computed for at most 8"
+    twins = from_edges([*((k, k + 1) for k in range(33)), (32, 34)])
+    many = sequence(twins, 0.5, top=8.0)
+    assert [(len(step.clusters[0]), max(step.classes)) for step in many.steps[:1]] == [(2, 33)]
+    checked = many.verify(periods=2, transient=0)
+    assert checked.verdicts[0] == "not computed"
+    assert checked.remarks[0] == "34 clusters; exponents are computed for at most 32"
     with pytest.raises(ValueError, match="apart: found 1; expected a number between 0 and 1"):
         sequence(star(3)).verify(1.0)
 
