@@ -37,7 +37,7 @@ reproduction = sc.results.Reproduction(
     {f"g k of {name} over the one-way ring": (1, found[name] / first, 0.01) for name in ("ring of 8", "all pairs of 4")}
 )
 print(reproduction)
-strengths = np.linspace(1.26, 1.32, 13)
+strengths = np.linspace(1.27, 1.3, 7)
 modes = [sc.exponents(scene, gk * np.array([0.5, 1.0]), g=gk / 3, starts=1, periods=1000).exponent for gk in strengths]
 plt.plot(strengths, modes)
 plt.axhline(0, color="black", linewidth=0.5)

@@ -35,7 +35,7 @@ reproduction = sc.results.Reproduction(
         "stable common states beyond": (0, np.sum(beyond[0]), 0),
         "states of oscillation death": (2, len(np.unique(states.round(6), axis=0)), 0),
         "sign of the product of both x": (-1, np.sign(states[0, 0] * states[0, 1]), 0),
-        "share of them that is stable": (1, np.mean(beyond[1]), 0),
+        "stable share of these states": (1, np.mean(beyond[1]), 0),
     }
 )
 print(reproduction)
