@@ -78,8 +78,9 @@ class HasAnimation(HasPlot):
     def animate(self, seconds: float = 10.0, fps: int = 25) -> Animation:
         """Return an animation of the first cell: a notebook plays it, ``save("motion.gif")`` writes it.
 
-        Up to twelve oscillators with friction are drawn as masses on a moving belt; other oscillators are
-        drawn as nodes of their graph, coloured by the first state.  A phase portrait is drawn beside them.
+        Up to twelve oscillators with friction or stops are drawn as masses on a moving belt, between walls.  Held
+        masses are orange; after an impact that the record of events has, the mass has a red edge.  Other oscillators
+        are drawn as nodes of their graph, coloured by the first state.  A phase portrait is drawn beside them.
 
         Parameters
         ----------

@@ -1,19 +1,24 @@
-"""Animations of a run: masses on a moving belt, or oscillators on a graph, next to the phase portrait."""
+"""Animations of a run: masses on a belt or between stops, or oscillators on a graph, next to the phase portrait."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+import sympy as sp
 from matplotlib.animation import FuncAnimation
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
+from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.contact import ContactModel
+from synchain.models.mechanics.events import Event
+from synchain.models.mechanics.rows import Law, Row
 from synchain.models.scenes.scene import Scene
 
 from ..results.result import Result
@@ -31,6 +36,12 @@ REACH = 0.3
 """Largest displacement of a drawn mass, as a fraction of the distance between two masses."""
 STICK = 1e-3
 """A mass sticks if its sliding speed is at most this fraction of the largest sliding speed."""
+
+FLASH = 3
+"""Number of frames in which a mass has a red edge after an impact."""
+WALL = 0.07
+"""Width of a drawn stop."""
+RED = "#c1121f"
 
 Update = Callable[[int], None]
 
@@ -71,14 +82,13 @@ def animate(result: Result, seconds: float, fps: int) -> Animation:
     x, v = (np.array([np.interp(time, samples, row) for row in rows]) for rows in (path, speed))
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.0), width_ratios=(3, 2), layout="constrained")
-    ground = _belt_speeds(scene, {name: float(data[name]) for name in scene.parameters if name in data.coords})
-    if ground is None or scene.n > ROW:
+    colours = np.array([[CYCLE[i % len(CYCLE)] for i in range(scene.n)]] * len(time))
+    floor = None if scene.n > ROW else _Floor.of(scene, data, time, v)
+    if floor is None:
         update_left = _graph(left, scene, x, symbols(first))
-        colours = np.array([[CYCLE[i % len(CYCLE)] for i in range(scene.n)]] * len(time))
     else:
-        sliding = np.abs(v - ground[:, None])
-        colours = np.where(sliding <= STICK * sliding.max(), ORANGE, BLUE).T
-        update_left = _belt(left, scene, time, x, ground, colours)
+        colours = np.where(floor.held, ORANGE, BLUE).T
+        update_left = _row(left, scene, time, x, floor, colours)
     trail = max(1, round(TRAIL * len(samples)))
     update_right = _portrait(right, path, speed, np.searchsorted(samples, time), trail, colours)
     right.set(xlabel=symbols(first), ylabel=symbols(second))
@@ -95,20 +105,81 @@ def animate(result: Result, seconds: float, fps: int) -> Animation:
     return motion
 
 
-def _belt_speeds(scene: Scene, cell: dict[str, float]) -> np.ndarray | None:
-    """Return the velocity of the ground of each oscillator (n,); None unless all have friction with a ground."""
-    if not all(kind.oscillator.takes_friction for kind in scene.model.kinds):
-        return None
-    try:
-        equations = scene.replace(contact=ContactModel.SET_VALUED).equations
-    except ValueError:  # several coordinates, or a ground that accelerates
-        return None
-    values = {**scene.parameters, **cell}
-    if equations.has_rows:
-        return None
-    targets = [node.events[0].target for node in equations.nodes]
-    speeds = [float(target.subs({s: values[s.name] for s in target.free_symbols})) for target in targets]
-    return np.array([speeds[kind] for kind in equations.kind_of])
+@dataclass(frozen=True, slots=True)
+class _Floor:
+    """What masses in a row move on: belts and walls, and the frames in which they are held or hit.
+
+    Shapes: held, hit and each belt (n, frames).
+    """
+
+    belt: np.ndarray | None  # velocity under each mass; None without contacts
+    walls: tuple[tuple[int, float, np.ndarray], ...]  # node, side (1: the mass is to the right), place in each frame
+    held: np.ndarray
+    hit: np.ndarray
+
+    @classmethod
+    def of(cls, scene: Scene, data: Any, time: np.ndarray, v: np.ndarray) -> _Floor | None:
+        """Return the floor of a cell; None unless all nodes have a contact or a stop of their first coordinate."""
+        exact = scene.contact == ContactModel.SET_VALUED or not all(
+            k.oscillator.takes_friction for k in scene.model.kinds
+        )
+        try:
+            equations = scene.equations if exact else scene.replace(contact=ContactModel.SET_VALUED).equations
+        except ValueError:  # a law that does not jump
+            return None
+        if equations.joined or not equations.sticks or any(len(node.continuous) < 2 for node in equations.nodes):
+            return None
+        cell = {name: float(data[name]) for name in scene.parameters if name in data.coords}
+        values = {sp.Symbol(name, real=True): sp.Float(e) for name, e in {**scene.parameters, **cell}.items()}
+        belts, walls = [], []
+        for i in range(scene.n):
+            # the first coordinate, and its velocity behind all coordinates
+            place, speed = (equations.symbols(i)[k] for k in (0, len(equations.node_at(i).continuous) // 2))
+            rows: tuple[Event | Row, ...] = (*equations.events_at(i), *equations.rows_at(i))
+            for row in rows:
+                law = getattr(row, "law", Law.SIGN)
+                s = {Law.SIGN: speed, Law.STOP: place}.get(law)
+                slope = sp.S.Zero if s is None else row.level.diff(s).xreplace(values)
+                if slope == 0 or not slope.is_number:
+                    continue
+                # the velocity of the ground, or the place of the stop, at which the level is zero
+                zero = (-row.level.xreplace({s: sp.S.Zero}) / slope).xreplace(values)
+                if zero.free_symbols - {TIME}:
+                    continue  # other states stand in the level
+                at = np.broadcast_to(np.asarray(sp.lambdify(TIME, zero, "numpy")(time), dtype=float), time.shape)
+                if law is Law.SIGN:
+                    belts.append((i, at))
+                else:
+                    walls.append((i, float(sp.sign(slope)), at))
+        if {i for i, *_ in (*belts, *walls)} != set(range(scene.n)):
+            return None
+        belt = np.array([dict(belts)[i] for i in range(scene.n)]) if len(dict(belts)) == scene.n else None
+        return cls(belt, tuple(walls), _held(scene, data, time, v, belt), _hits(scene, data, time))
+
+
+def _held(scene: Scene, data: Any, time: np.ndarray, v: np.ndarray, belt: np.ndarray | None) -> np.ndarray:
+    """Return the frames (n, frames) in which a mode is 0; without modes those in which a mass moves with the belt."""
+    modes = sorted(scene.equations.modes)
+    if modes:
+        frames = np.clip(np.searchsorted(data.time.values, time), 0, data.sizes["sample"] - 1)
+        samples = data.trajectory.transpose("component", "node", "sample").sel(component=modes).values[..., frames]
+        return np.asarray((samples == 0.0).any(axis=0))
+    sliding = np.abs(v - belt)
+    return np.asarray(sliding <= STICK * sliding.max())
+
+
+def _hits(scene: Scene, data: Any, time: np.ndarray) -> np.ndarray:
+    """Return the frames (n, frames) that follow an impact that was recorded."""
+    hit = np.zeros((scene.n, len(time)), dtype=bool)
+    if "event_impacts" not in data:
+        return hit
+    struck = data.event_before.values == 1.0
+    laws = [[getattr(row, "law", Law.SIGN) for row in scene.equations.node_at(i).conditions] for i in range(scene.n)]
+    for at, node, row in zip(*(data[f"event_{name}"].values[struck] for name in ("time", "node", "row")), strict=True):
+        if laws[int(node) - 1][int(row) - 1] is Law.STOP:
+            first = int(np.searchsorted(time, at))
+            hit[int(node) - 1, first : first + FLASH] = True
+    return hit
 
 
 def _portrait(axes: Axes, x: np.ndarray, v: np.ndarray, ends: np.ndarray, trail: int, colours: np.ndarray) -> Update:
@@ -136,20 +207,29 @@ def _graph(axes: Axes, scene: Scene, x: np.ndarray, label: str) -> Update:
     return lambda frame: nodes.set_array(x[:, frame])
 
 
-def _belt(axes: Axes, scene: Scene, time: np.ndarray, x: np.ndarray, ground: np.ndarray, colours: np.ndarray) -> Update:
-    """Draw masses in a row on a belt, with colours (frames, n), and springs between linked ones."""
+def _row(axes: Axes, scene: Scene, time: np.ndarray, x: np.ndarray, floor: _Floor, colours: np.ndarray) -> Update:
+    """Draw masses in a row, with colours (frames, n): their belt or rail, their stops, and springs between linked ones."""
     n, side = len(x), 0.34
-    scale = REACH / (np.abs(x).max() or 1.0)
+    scale = REACH / (max(np.abs(x).max(), *(np.abs(at).max() for _, _, at in floor.walls), 0.0) or 1.0)
     centre = np.arange(n)[:, None] + scale * x  # (n, frames)
-    # the belt: its two sides, rollers, and marks that move with it
-    low, high = -0.8, n - 0.2
-    for y in (0.0, -0.3):
-        axes.plot([low, high], [y, y], color=BLACK, linewidth=2.0, zorder=1)
-    for end in (low, high):
-        axes.add_patch(Circle((end, -0.15), 0.15, facecolor=GREY, edgecolor=BLACK, linewidth=1.5, zorder=0))
-    spacing = 0.25
-    marks = axes.vlines(np.arange(low, high, spacing), -0.07, 0.0, color=BLACK, linewidth=1.0)
-    masses = [Rectangle((0.0, 0.0), side, side, edgecolor=BLACK, linewidth=1.0, zorder=3) for _ in range(n)]
+    low, high, spacing = -0.8, n - 0.2, 0.25
+    axes.plot([low, high], [0.0, 0.0], color=BLACK, linewidth=2.0, zorder=1)
+    marks, moved = None, np.zeros(len(time))
+    if floor.belt is not None:
+        # the belt: its two sides, rollers, and marks that move with it
+        axes.plot([low, high], [-0.3, -0.3], color=BLACK, linewidth=2.0, zorder=1)
+        for end in (low, high):
+            axes.add_patch(Circle((end, -0.15), 0.15, facecolor=GREY, edgecolor=BLACK, linewidth=1.5, zorder=0))
+        marks = axes.vlines(np.arange(low, high, spacing), -0.07, 0.0, color=BLACK, linewidth=1.0)
+        speed = floor.belt[0]
+        moved = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))])
+    walls = []
+    for i, open_side, at in floor.walls:
+        edges = i + scale * at - 0.5 * side * open_side  # where the mass touches the wall
+        wall = Rectangle((0.0, 0.0), WALL, 1.5 * side, facecolor=GREY, edgecolor=BLACK, hatch="////", zorder=2)
+        axes.add_patch(wall)
+        walls.append((wall, edges - WALL * (open_side > 0.0)))
+    masses = [Rectangle((0.0, 0.0), side, side, zorder=3) for _ in range(n)]
     for mass in masses:
         axes.add_patch(mass)
     labels = [
@@ -164,15 +244,20 @@ def _belt(axes: Axes, scene: Scene, time: np.ndarray, x: np.ndarray, ground: np.
         aspect="equal",
     )
     axes.set_axis_off()
-    axes.set_title("orange: sticks to the belt", loc="right", fontsize="medium", color=ORANGE)
+    words = ["orange: held"] + (["red edge: impact"] if floor.hit.any() else [])
+    axes.set_title(", ".join(words), loc="right", fontsize="medium", color=ORANGE)
 
     def update(frame: int) -> None:
-        start = low + (scale * ground[0] * time[frame]) % spacing
-        at = np.arange(start, high, spacing)
-        marks.set_segments([[(a, -0.07), (a, 0.0)] for a in at])
+        if marks is not None:
+            start = low + (scale * moved[frame]) % spacing
+            marks.set_segments([[(a, -0.07), (a, 0.0)] for a in np.arange(start, high, spacing)])
+        for wall, places in walls:
+            wall.set_xy((places[frame], 0.0))
         for i, mass in enumerate(masses):
             mass.set_xy((centre[i, frame] - 0.5 * side, 0.0))
             mass.set_facecolor(colours[frame, i])
+            mass.set_edgecolor(RED if floor.hit[i, frame] else BLACK)
+            mass.set_linewidth(4.0 if floor.hit[i, frame] else 1.0)
             labels[i].set_position((centre[i, frame], 0.5 * side))
         for spring, (i, j) in zip(springs, pairs, strict=True):
             spring.set_data(*_spring(centre[i, frame], centre[j, frame], side, j - i))
