@@ -14,7 +14,7 @@ Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (S
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 from numbers import Integral, Real
@@ -51,6 +51,10 @@ CLOSED = 1e-9
 
 SEGMENTS = 4
 """Segments of an undriven orbit that is looked for near a start and a period (a choice)."""
+
+PARTS, FOLLOWED, SPANS, RECURRENCES = 32, 4, (0.7, 1.4), 3
+"""Where Newton's method fails from a start, the motion is followed over FOLLOWED periods with PARTS states in each, and
+the RECURRENCES closest returns after SPANS of a period are tried (choices)."""
 
 REST = 1e-9
 """A motion rests if its rates are below their change over this part of its extent (a choice)."""
@@ -93,7 +97,8 @@ def periodic_orbit(
         initial state after its transient.  Without a drive and without `period`, the motion from the start must reach
         the orbit, which must attract; the transient counts mean return times.
     period : float, optional
-        The period near which an undriven orbit is looked for from `start`: Newton's method alone, for unstable orbits too.
+        The period near which an undriven orbit is looked for from `start`: Newton's method, for unstable orbits too; where
+        it fails, again from places at which the motion from `start` nearly returns.
     clusters : sequence of int, optional
         The cluster of each node, such as ``[0, 1, 1, 0]``; by default the nodes with one start that symmetry keeps alike.
     parameters : mapping of str to float, optional
@@ -169,10 +174,25 @@ def periodic_orbit(
         if period is not None:
             length = check_number("period", period, 0.0)
             # Segments bend the orbit less, so that Newton's method comes from further away; a body may stick in one.
-            parts = np.arange(1 if equations.sticks else SEGMENTS) * length / SEGMENTS
-            states = np.vstack([state, flow.advance(scene.parameters, np.tile(state, (len(parts) - 1, 1)), parts[1:])])
-            problem = Cycles.near(scene, (), classes, states, length, 0)
-            z, gap, steps = problem.solved()
+            count = 1 if equations.sticks else SEGMENTS
+
+            def later(times: np.ndarray) -> np.ndarray:
+                return flow.advance(scene.parameters, np.tile(state, (len(times), 1)), times)
+
+            def solve(begin: float, span: float) -> tuple[Cycles, np.ndarray, float, int]:
+                times = begin + np.arange(count) * span / count
+                states = np.vstack([state, later(times[1:])]) if begin == 0.0 else later(times)
+                problem = Cycles.near(scene, (), classes, states, span, 0)
+                return problem, *problem.solved()
+
+            problem, z, gap, steps = solve(0.0, length)
+            if not _accepted(problem, z) and not equations.sticks:
+                # Newton's method from the start ends in a minimum of the residual: start where the motion nearly returns.
+                for begin, span in _recurrences(later, length):
+                    problem, z, other, steps = solve(begin, span)
+                    if _accepted(problem, z):
+                        break
+                    gap = min(gap, other)
             if not _accepted(problem, z):
                 raise ArithmeticError(
                     f"no orbit near the start with a period near {length:.6g}: the best residual was {gap:.1e}"
@@ -180,6 +200,24 @@ def periodic_orbit(
         else:
             problem, z, steps = _cycle(scene, classes, flow, state)
     return _described(problem, problem.solution(Point(z, z, steps)), z)
+
+
+def _recurrences(later: Callable[[np.ndarray], np.ndarray], period: float) -> list[tuple[float, float]]:
+    """Return the times at which a motion nearly returns after about a period, with the times it takes, the closest first."""
+    # `later` returns the states after some times.
+    step, shortest, longest = period / PARTS, round(SPANS[0] * PARTS), round(SPANS[1] * PARTS)
+    try:
+        states = later(step * np.arange(1, FOLLOWED * PARTS + 1))
+    except FloatingPointError:  # the motion escapes
+        return []
+    extent = np.ptp(states, axis=0)
+    scaled = states / np.where(extent > 0.0, extent, 1.0)
+    matches = []
+    for lag in range(shortest, longest + 1):
+        gaps = np.abs(scaled[lag:] - scaled[:-lag]).max(axis=1)
+        k = int(gaps.argmin())
+        matches.append((float(gaps[k]), step * (k + 1), step * lag))
+    return [(begin, span) for _, begin, span in sorted(matches)[:RECURRENCES]]
 
 
 def check_periods(periods: object) -> None:
