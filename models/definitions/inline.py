@@ -744,6 +744,7 @@ def _law(what: str, value: object, defaults: Mapping[str, Parameter]) -> Frictio
     if isinstance(value, str):
         return load_friction_law(value)
     expected = "a name, a law that friction_law('mu*sign(w)', {'mu': 0.3}) makes, or an expression of SymPy of w"
+    expected += "; a law of one contact: events=[Friction(w, load, law)]" if isinstance(value, Mapping) else ""
     force = check_instance(f"{what}: friction", value, (sp.Expr, int, float), expected)
     about = f"{what}: friction"
     coefficient = _ModelNames.of_law(about, defaults).expression("law", force)

@@ -89,6 +89,13 @@ def test_refused_in_one_line(name: str) -> None:
     assert "\n" not in str(refusal.value)
 
 
+def test_a_table_of_laws_names_the_way_to_a_law_for_each_contact() -> None:
+    with pytest.raises(
+        TypeError, match=r"friction: found .*; a law of one contact: events=\[Friction\(w, load, law\)\]"
+    ):
+        body(friction={"": "coulomb"}, force=sc.friction(-v))
+
+
 @pytest.mark.parametrize(
     "rate", [1 - sp.exp(sp.sign(x)), 1 - 2 * sp.Heaviside(x), sp.Piecewise((-1 - x, x > 0), (2 - x, True))]
 )
