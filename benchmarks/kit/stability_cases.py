@@ -17,6 +17,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.inputs.plugins import allow_code
 from synchain.models.scenes.scene import Scene
 
+from .stability_events import events
 from .stability_models import said
 
 BUDGET = 2_000_000
@@ -34,6 +35,7 @@ class Case:
     """A scene, and the independent source of its end state, a name in
     `_stability_reference.REFERENCES`.
 
+    `growth`: how much a small change of the state grows until the end, where it is known and large.
     With `skip` it is run as everybody runs it, with whatever `run` may leave out; else every step
     is made.
     """
@@ -43,6 +45,7 @@ class Case:
     scene: Scene
     reference: str = "radau"
     skip: bool = False
+    growth: float = 1.0
 
 
 def cases(quick: bool = False) -> Iterator[Case]:
@@ -59,6 +62,8 @@ def cases(quick: bool = False) -> Iterator[Case]:
     yield from _long(quick)
     for group, name, scene, reference in said(quick):
         yield Case(group, name, scene, reference)
+    for name, scene, reference, growth in events(quick):
+        yield Case("events", name, scene, reference, growth=growth)
 
 
 def _scene(n: int = 1, **changes: object) -> Scene:

@@ -18,6 +18,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
 
+from . import stability_events
 from .cases import normal_modes
 
 RTOL, ATOL = 1e-11, 1e-13
@@ -31,6 +32,10 @@ FLOOR = {
     "alone": 1e-11,
     "explicit": 1e-11,
     "none": 0.0,
+    "rebounds": 1e-13,
+    "coulomb": 1e-13,
+    "spring": 1e-13,
+    "pool": 1e-13,
 }
 """How far a reference itself may be off, relative to the size of the state; "smooth" is another
 law, O(kappa^-1/2) away.
@@ -151,5 +156,9 @@ REFERENCES: dict[str, Callable[[Scene], np.ndarray]] = {
     "steady": _steady,
     "explicit": _explicit,
     "none": _none,
+    "rebounds": stability_events.rebounds,
+    "coulomb": stability_events.coulomb,
+    "spring": stability_events.spring,
+    "pool": stability_events.pool,
 }
 """Name -> end state of a scene."""
