@@ -369,7 +369,7 @@ def drawn(seed: int, number: int) -> tuple[sc.Scene, System, np.ndarray]:
 
 STRUCTURES, DRAWS = 25, 12
 """Structures, and scenes of each: 300 scenes."""
-QUICK = [(0, 1), (0, 5), (2, 2), (5, 3)]
+QUICK = [(0, 1), (0, 5), (2, 2)]
 """Scenes of every run of the tests."""
 REFERENCE = 1e-10
 """Error of the reference, times the growth of a small change."""
@@ -403,7 +403,7 @@ def check(seed: int, number: int) -> tuple[str, str]:
         return "no reference", "the reference gives up near the start"
     size = max(1.0, float(np.abs(right.z).max()))
     growth = max(1.0, 1e7 * float(np.abs(moved.z - right.z).max()))
-    allowed = (300 * scene.rtol + REFERENCE) * size * growth
+    allowed = (30 * scene.rtol + REFERENCE) * size * growth
     if not allowed < 1e-2 * size:
         return "sensitive", f"growth {growth:.3g}, allowed {allowed:.3g}"
     n, d = scene.n, len(start) // scene.n
