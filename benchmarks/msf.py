@@ -1,14 +1,14 @@
 """What a master stability function costs: many strengths along one orbit, and the same exponents by
 JiTCODE.
 
-"one orbit" is the friction oscillator's, with set-valued and with smoothed friction: CPU time of
-one drive period of an average over PERIODS of them, with all strengths along it and their standard
-errors, one start, one thread, beside the same stretch of the orbit by itself (the kernel of one
-oscillator, the same method and tolerance). `integrated` strengths are carried along, the others
-interpolated; differences are those of the mean growth with interpolation from that with every
-strength integrated, along a periodic orbit and by the same steps. The largest one lies where a
-multiplier passes through zero and the exponent dips towards -inf: there any relative accuracy of
-the propagators is lost in the logarithm.
+"one orbit" is the friction oscillator's, with set-valued and with smoothed friction, or that of an
+impact oscillator: CPU time of one drive period of an average over PERIODS of them, with all
+strengths along it and their standard errors, one start, one thread, beside the same stretch of the
+orbit by itself (the kernel of one oscillator, the same method and tolerance). `integrated`
+strengths are carried along, the others interpolated; differences are those of the mean growth with
+interpolation from that with every strength integrated, along a periodic orbit and by the same
+steps. The largest one lies where a multiplier passes through zero and the exponent dips towards
+-inf: there any relative accuracy of the propagators is lost in the logarithm.
 
 "to an error bar" is the CPU time from the start of the transient until the standard error of every
 exponent is below PRECISION, by the same estimate from batches; medians over several starts (of the
@@ -30,6 +30,7 @@ from unittest import mock
 
 import numpy as np
 
+from synchain import Lagrangian, Stop
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
@@ -65,8 +66,14 @@ COLUMNS = (
     "exponent",
     "standard error",
 )
-LAWS = {"set-valued": "set-valued friction, omega = 1.4", "atan": "friction, omega = 1.4"}
+LAWS = {
+    "set-valued": "set-valued friction, omega = 1.4",
+    "atan": "friction, omega = 1.4",
+    "impact": "impact oscillators, omega = 0.8",
+}
 """Contacts of the orbits, and what the table calls them."""
+OMEGAS = {"set-valued": (1.4, 1.15), "atan": (1.4, 1.15), "impact": (0.8, 0.8)}
+"""Frequencies of the orbit that is timed, and of the periodic one along which differences are taken."""
 COUNTS = (1, 8, 100, 1_000, 10_000)
 PERIODS, REVIEWED = 1_000, 128
 """Periods that are timed, and those over which differences are taken."""
@@ -155,7 +162,7 @@ def orbit_rows(contact: str, quick: bool) -> list[Row]:
     """
     periods, reviewed, rounds = (64, 16, 2) if quick else (PERIODS, REVIEWED, 12)
     chosen = [strengths(count) for count in ((1, 100) if quick else (*COUNTS, 0))]
-    ready = [_ready(contact, 1.4, values, periods) for values in chosen]
+    ready = [_ready(contact, OMEGAS[contact][0], values, periods) for values in chosen]
     alone = _alone(*ready[0], periods)
     best, steps = [math.inf] * (1 + len(ready)), [0.0] * (1 + len(ready))
     runs: list[Callable[[], int]] = [alone, *(partial(_along, *pair, periods) for pair in ready)]
@@ -181,9 +188,23 @@ def _span(values: Sequence[float] | np.ndarray) -> str:
     return f"{values[0]:g}" if len(values) == 1 else f"{values[0]:g} … {values[-1]:g}"
 
 
+def _impact_pair() -> Scene:
+    """Two oscillators with a stop at 0.6 and restitution 0.7; one impact a period at omega = 0.8."""
+    oscillator = Lagrangian(
+        "v**2/2",
+        "x**2/2",
+        {"x": "cos(omega*t)/2 - v/10"},
+        coordinates={"x": "v"},
+        parameters={"omega": 0.8},
+        events=[Stop("3/5 - x", "7/10")],
+        initial={"x": 0.4, "v": -0.5},
+    )
+    return Scene(oscillator, "spring", topology("chain", 2), record=())
+
+
 def _settled(contact: str, omega: float, values: np.ndarray) -> tuple[OrbitProblem, np.ndarray]:
     """Modes along one orbit, and its state (1, components) after the transient."""
-    pair = Scene(topology=topology("chain", 2), record=(), contact=contact)
+    pair = _impact_pair() if contact == "impact" else Scene(topology=topology("chain", 2), record=(), contact=contact)
     scene = coupled_cell(Given(exponents, {"omega": omega}), pair, RTOL)
     start = np.array([[numbers[0] for numbers in scene.initial.values()]])
     problem = OrbitProblem.of_modes(scene, values, start, workers=1)
@@ -209,15 +230,8 @@ def _along(march: March, state: np.ndarray, periods: int) -> int:
 def _alone(march: March, state: np.ndarray, periods: int) -> Callable[[], int]:
     """A function that runs the same stretch of the orbit without modes and returns its steps."""
     problem = march.problem
-    scene = Scene(
-        topology=topology("chain", 1),
-        record=(),
-        contact=problem.scene.contact,
-        integrator=problem.method.name,
-        rtol=RTOL,
-        transient=0.0,
-        window=periods,
-        parameters={"omega": problem.scene.parameters["omega"]},
+    scene = problem.scene.lone.replace(
+        record=(), integrator=problem.method.name, rtol=RTOL, transient=0.0, window=periods, time_unit="period"
     )
     cells, compiled = plan(scene), kernel(scene, 1, reduce=False)
     rtol, atol = (float(own.min()) for own in tolerances(scene, scene.equations, cells.numbers))
@@ -236,10 +250,10 @@ def difference(contact: str, values: np.ndarray, periods: int) -> tuple[float, f
     """The largest and the median difference of mean growth, with strengths interpolated and with
     all of them integrated.
 
-    Along the periodic orbit at omega = 1.15, over so many periods.  The orbit alone chooses the
+    Along a periodic orbit, over so many periods.  The orbit alone chooses the
     steps of both, so that nothing but the interpolation tells them apart.
     """
-    problem, state = _settled(contact, 1.15, values)
+    problem, state = _settled(contact, OMEGAS[contact][1], values)
     chosen, sums = interpolation_for(problem, state, periods), []
     for interpolation in (chosen.strengths, exact_interpolation(values)):
         march = March.begin(problem, state, BlockInterpolation(chosen.block, interpolation), BY_ORBIT)

@@ -54,7 +54,7 @@ def test_costs_are_beside_the_orbit_alone(rows) -> None:
 @pytest.mark.parametrize("contact", msf.LAWS)
 def test_modes_run_along_the_stretch_that_the_orbit_alone_does(contact: str) -> None:
     """Once more from the settled state: as many steps as before, and the same end but for rounding."""
-    moved, state = msf._ready(contact, 1.15, np.array([0.5]), 8)
+    moved, state = msf._ready(contact, msf.OMEGAS[contact][1], np.array([0.5]), 8)
     msf._along(moved, state, 8)  # the first Taylor step of all finds its scale
     first = msf._along(moved, state, 8), moved.integrator.state.copy()
     assert first[0] == msf._along(moved, state, 8)
