@@ -241,6 +241,11 @@ REFUSED = {
         lambda: sc.exponents(scene("harmonic", RUB, sc.graphs.ring(3), 1.0, "auto"), [0.1]),
         "friction in links holds equal oscillators together",
     ),
+    "closed": (lambda: sc.msf(scene("harmonic", CRADLE, sc.graphs.ring(3), 1.0, "auto"), [0.1]), "gap 0 between equal oscillators; expected a positive gap"),
+    "open": (
+        lambda: sc.msf(scene("harmonic", sc.Potential(0, events=[sc.Stop("x_j - x_i + 1")]), sc.graphs.ring(3), 1.0, "auto"), [0.1]),
+        "if the gap 1 is positive; expected the coupling without them",
+    ),
     "export": (lambda: sc.export.to_c(scene(BLOCK, CRADLE, sc.graphs.chain(2), 1.0, "auto").equations), "found contacts or stops in links"),
 }  # fmt: skip
 
