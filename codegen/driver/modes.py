@@ -276,7 +276,7 @@ def march(functions, dims, owners, first, last, inputs, deviations, outputs, pro
     out = address(dense, dense_size)
     shared = address(out, contact_size)
     slips = address(shared, dims.shared)
-    friction = Friction(middle, out, clock, address(control, 0), (), dims, functions)
+    friction = EventWorkspace(middle, out, clock, address(control, 0), (), dims, functions)
     orbit = Orbit(clock, y, y_new, dense, shared, slips, address(control, 0), friction)
 
     # 2. Workspace of the deviations, in registers.

@@ -39,7 +39,7 @@ class Results(NamedTuple):
     paused: Any  # (cells, any): lanes of cells that pause or whose steps underflow
 
 
-class Friction(NamedTuple):
+class EventWorkspace(NamedTuple):
     """Contacts or rows: the functions of the scene that decide on them, their arguments and their output."""
 
     middle: Any  # address of a state inside a step
@@ -81,7 +81,7 @@ class Orbit(NamedTuple):
     shared: Any  # Jacobians of a step, or their series, for the modes
     slips: Any  # modes of the contacts before an event; of rows, the state, and 1 for a closed gap
     control: Any
-    friction: Friction
+    friction: EventWorkspace
 
 
 class Modes(NamedTuple):

@@ -1,5 +1,6 @@
-"""Rows of nodes (models/mechanics/rows.py): their gaps, and which of them are held after an event.
+"""Rows (models/mechanics/rows.py): their gaps, and which of them are held after an event.
 
+A node below is any group of rows that are solved together: those of one node, or of the nodes that links join.
 An event of a node has two parts.  Guards reset states and stops rebound: speeds jump.  Then all rows on their surfaces
 are decided together: of all sets of held rows that agree with the laws (held: |x| <= r, or x >= 0 at a stop; others leave
 the surface) the one with most held rows, then with fewest changes of mode, then with the least largest |x|.  Held rows
@@ -85,6 +86,14 @@ def number(group, row, lane, out, dims):
 
 
 @njit(error_model="numpy", forceinline=True)
+def clear_impulses(friction):
+    """Set impulses, corrections of gaps and resets to zero."""
+    for group in range(K + friction.dims.felt, K + friction.dims.felt + 3):
+        for row in range(friction.dims.rows):
+            store(friction.out, place(group, row, friction.dims), broadcast(0.0, WIDTH))
+
+
+@njit(error_model="numpy", forceinline=True)
 def strike(t, y, friction):
     """Apply impulses, corrections and resets, and store the modes."""
     if LOOPED:
@@ -92,9 +101,7 @@ def strike(t, y, friction):
         friction.functions.strike(t, y, y, friction.out, graph, weights)
     else:
         friction.functions.strike(t, y, y, friction.out)
-    for group in range(K + friction.dims.felt, K + friction.dims.felt + 3):
-        for row in range(friction.dims.rows):
-            store(friction.out, place(group, row, friction.dims), broadcast(0.0, WIDTH))
+    clear_impulses(friction)
 
 
 @njit(error_model="numpy")
@@ -192,58 +199,91 @@ def agrees(modes, chosen, decided, x, slack, lane, first, size, out, dims):
 
 
 @njit(error_model="numpy")
+def known_modes(notes, modes, decided, lane, first, size, out, dims):
+    """Fill the modes that an event determines, mark the rows that forces decide, and return the number of choices."""
+    count = 1
+    for a in range(size):
+        row = first + a
+        decided[a] = notes[row, ROLE] == OPEN
+        count *= 3 if decided[a] else 1
+        modes[a] = number(MODE, row, lane, out, dims)
+        if notes[row, ROLE] == RELEASED:
+            # a stop opens, a contact slips to the side of its force
+            opens = number(LAW, row, lane, out, dims) == OF_STOP
+            modes[a] = 1.0 if opens or notes[row, X] > 0.0 else -1.0
+    return count
+
+
+@njit(error_model="numpy")
+def choose(code, notes, modes, chosen, decided, lane, first, size, out, dims):
+    """Set the modes of one choice; return the numbers of held rows and of changes, -1 held for a stop with mode -1.
+
+    The digits of the choice in base 3 are the modes of the decided rows: 0 held, 1, 2 for mode -1.
+    """
+    held, changes, left = 0, 0, code
+    for a in range(size):
+        chosen[a] = False
+        if decided[a]:
+            left, digit = left // 3, left % 3
+            if digit == 2 and number(LAW, first + a, lane, out, dims) == OF_STOP:
+                return -1, 0
+            chosen[a] = digit == 0
+            modes[a] = 0.0 if digit == 0 else 1.0 if digit == 1 else -1.0
+            held += int(digit == 0)
+            changes += int(modes[a] != notes[first + a, BEFORE])
+    return held, changes
+
+
+@njit(error_model="numpy")
+def friction_drops(decided, lane, first, size, out, dims):
+    """Return True if friction of a decided row drops where slip begins, so that several sets may agree with the laws."""
+    for a in range(size):
+        row = first + a
+        if decided[a] and number(LAW, row, lane, out, dims) == OF_SIGN and number(RATIO, row, lane, out, dims) > 1.0:
+            return True
+    return False
+
+
+@njit(error_model="numpy", forceinline=True)
+def is_better(held, changes, largest, most, fewest, least):
+    """Return True for more held rows, then for fewer changes, then for a smaller largest force."""
+    return held > most or (held == most and (changes < fewest or (changes == fewest and largest < least)))
+
+
+@njit(error_model="numpy")
 def decide(notes, lane, first, size, friction):
     """Store the modes of the rows of a node after an event; return False if the laws determine none."""
     out, dims = friction.out, friction.dims
-    modes, best, x = np.empty(size), np.empty(size), np.empty(size)
+    modes, x = np.empty(size), np.empty(size)
     chosen, decided = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
-    count, drops = 1, False
-    for a in range(size):
-        decided[a] = notes[first + a, ROLE] == OPEN
-        modes[a] = number(MODE, first + a, lane, out, dims)
-        if notes[first + a, ROLE] == RELEASED:
-            modes[a] = 1.0 if number(LAW, first + a, lane, out, dims) == OF_STOP or notes[first + a, X] > 0.0 else -1.0
-        best[a] = modes[a]
-        if decided[a]:
-            count *= 3
-            drops = drops or (
-                number(LAW, first + a, lane, out, dims) == OF_SIGN and number(RATIO, first + a, lane, out, dims) > 1.0
-            )
-    found, most, fewest, least = 0, -1, 0, 0.0
+    count = known_modes(notes, modes, decided, lane, first, size, out, dims)
+    # the best choice so far; without rows to decide the modes are known
+    best, matches, most, fewest, least = 0, 0, -1, 0, 0.0
     for slack in (0.0, 1e-9):
-        if found > 0:
+        if matches > 0:
             break
         for code in range(count):
-            rest, held, changes, possible = code, 0, 0, True
-            for a in range(size):
-                chosen[a] = False
-                if decided[a]:
-                    digit, rest = rest % 3, rest // 3
-                    chosen[a] = digit == 0
-                    modes[a] = 0.0 if digit == 0 else 1.0 if digit == 1 else -1.0
-                    held += int(digit == 0)
-                    changes += int(modes[a] != notes[first + a, BEFORE])
-                    possible = possible and not (digit == 2 and number(LAW, first + a, lane, out, dims) == OF_STOP)
-            if not possible or not hold(modes, chosen, x, lane, first, size, out, dims):
+            held, changes = choose(code, notes, modes, chosen, decided, lane, first, size, out, dims)
+            if held < 0 or not hold(modes, chosen, x, lane, first, size, out, dims):
                 continue
             if not agrees(modes, chosen, decided, x, slack, lane, first, size, out, dims):
                 continue
+            matches += 1
             largest = 0.0
             for a in range(size):
                 largest = max(largest, abs(x[a]) if decided[a] else 0.0)
-            found += 1
-            better = held > most or (held == most and changes < fewest)
-            if better or (held == most and changes == fewest and largest < least):
-                most, fewest, least = held, changes, largest
-                for a in range(size):
-                    best[a] = modes[a]
-        if found > 1 and slack > 0.0:
-            found = 1  # on the border of two sets, which are the same motion
+            if is_better(held, changes, largest, most, fewest, least):
+                best, most, fewest, least = code, held, changes, largest
+        if matches > 1 and slack > 0.0:
+            matches = 1  # on the border of two sets, which are the same motion
+    if matches > 0:
+        choose(best, notes, modes, chosen, decided, lane, first, size, out, dims)
     for a in range(size):
-        put(out, place(MODE, first + a, dims), lane, best[a])
-    if drops:
-        return found > 0 and positive_minors(decided, lane, first, size, out, dims)
-    return found == 1
+        known = matches > 0 or not decided[a]
+        put(out, place(MODE, first + a, dims), lane, modes[a] if known else number(MODE, first + a, lane, out, dims))
+    if friction_drops(decided, lane, first, size, out, dims):
+        return matches > 0 and positive_minors(decided, lane, first, size, out, dims)
+    return matches == 1
 
 
 @njit(error_model="numpy")
@@ -360,59 +400,78 @@ def size_of(first, lane, out, dims):
 
 
 @njit(error_model="numpy")
+def begin_events(lanes, notes, friction):
+    """Begin the events of nodes with closed gaps and keep the held rows of all others; return True if a speed changes."""
+    out, dims, struck = friction.out, friction.dims, False
+    for lane in range(WIDTH):
+        first = 0
+        while (lanes >> lane) & 1 and first < dims.rows:
+            size, closed = size_of(first, lane, out, dims), False
+            for row in range(first, first + size):
+                notes[lane, row, BEFORE] = number(MODE, row, lane, out, dims)
+                closed = closed or number(GAP, row, lane, out, dims) <= 0.0
+            if closed:
+                outcome = begin_event(notes[lane], lane, first, size, friction)
+                struck = struck or outcome > 0
+                if outcome == 2:
+                    put(friction.clock, RUSH, lane, math.inf)
+            else:
+                struck = project_held(lane, first, size, friction) or struck
+            first += size
+    return struck
+
+
+@njit(error_model="numpy")
+def end_events(lanes, notes, friction):
+    """Decide the modes of all nodes with events, from the speeds after the impacts."""
+    out, dims = friction.out, friction.dims
+    for lane in range(WIDTH):
+        first = 0
+        while (lanes >> lane) & 1 and first < dims.rows:
+            size, closed = size_of(first, lane, out, dims), False
+            for row in range(first, first + size):
+                closed = closed or notes[lane, row, ROLE] != UNTOUCHED
+            if closed:
+                after_jump(notes[lane], lane, first, size, friction)
+                if not decide(notes[lane], lane, first, size, friction):
+                    put(friction.clock, RUSH, lane, math.inf)
+                project_held(lane, first, size, friction)
+            first += size
+
+
+@njit(error_model="numpy")
+def record_modes(lanes, notes, friction):
+    """Write what the record of events reads to the groups of the looks: 1 for an event, mode before, mode after."""
+    out, dims = friction.out, friction.dims
+    for lane in range(WIDTH):
+        for row in range(dims.rows if (lanes >> lane) & 1 else 0):
+            before, after = notes[lane, row, BEFORE], number(MODE, row, lane, out, dims)
+            put(out, place(6, row, dims), lane, 1.0 if notes[lane, row, SHUT] != 0.0 or before != after else 0.0)
+            put(out, place(7, row, dims), lane, before)
+            put(out, place(8, row, dims), lane, after)
+
+
+@njit(error_model="numpy")
 def change_modes(moved, t, y, friction):
     """Let the rows of every node with a closed gap rebound, reset, be held, slip or open; return the lanes with events.
 
-    Held rows are kept on their surfaces.  The groups of the looks get, for the record of events: 1 for an event, mode
-    before and after.
+    Held rows are kept on their surfaces.
     """
     if not any_lane(moved):
         return 0
-    out, dims = friction.out, friction.dims
-    shut = moved & (smallest_gap(t, y, y, friction) <= 0.0)
-    for group in range(K + dims.felt, K + dims.felt + 3):
-        for row in range(dims.rows):
-            store(out, place(group, row, dims), broadcast(0.0, WIDTH))
-    notes, active, events = np.zeros((WIDTH, dims.rows, 5)), lane_bits(moved), lane_bits(shut)
-    for part in range(2):
-        if part > 0 and events == 0:
-            break
-        struck = False
-        for lane in range(WIDTH):
-            if not (((events if part else active) >> lane) & 1):
-                continue
-            first = 0
-            while first < dims.rows:
-                size, closed = size_of(first, lane, out, dims), False
-                for row in range(first, first + size):
-                    if part == 0:
-                        notes[lane, row, BEFORE] = number(MODE, row, lane, out, dims)
-                        closed = closed or number(GAP, row, lane, out, dims) <= 0.0
-                    else:
-                        closed = closed or notes[lane, row, ROLE] != UNTOUCHED
-                if part == 0 and closed:
-                    outcome = begin_event(notes[lane], lane, first, size, friction)
-                    struck = struck or outcome > 0
-                    if outcome == 2:
-                        put(friction.clock, RUSH, lane, math.inf)
-                elif part == 0:
-                    struck = project_held(lane, first, size, friction) or struck
-                elif closed:
-                    after_jump(notes[lane], lane, first, size, friction)
-                    if not decide(notes[lane], lane, first, size, friction):
-                        put(friction.clock, RUSH, lane, math.inf)
-                    project_held(lane, first, size, friction)
-                first += size
-        if struck or part == 1:
-            strike(t, y, friction)
-        if part == 0 and struck and events != 0:
-            push(t, y, y, friction)
-    for lane in range(WIDTH):
-        for row in range(dims.rows if (events >> lane) & 1 else 0):
-            before, after = notes[lane, row, BEFORE], number(MODE, row, lane, out, dims)
-            # a rebound and a reset leave the mode as it is; a surface that is touched and not crossed is no event
-            leaps = notes[lane, row, SHUT] != 0.0 and number(LAW, row, lane, out, dims) != OF_SIGN
-            put(out, place(6, row, dims), lane, 1.0 if leaps or before != after else 0.0)
-            put(out, place(7, row, dims), lane, before)
-            put(out, place(8, row, dims), lane, after)
+    events = lane_bits(moved & (smallest_gap(t, y, y, friction) <= 0.0))
+    clear_impulses(friction)
+    notes = np.zeros((WIDTH, friction.dims.rows, 5))
+    # 1. Speeds jump: stops rebound, guards reset states, held rows return to their surfaces.
+    struck = begin_events(lane_bits(moved), notes, friction)
+    if struck:
+        strike(t, y, friction)
+    if events == 0:
+        return 0
+    # 2. Modes change, by the speeds and forces after the jumps.
+    if struck:
+        push(t, y, y, friction)
+    end_events(events, notes, friction)
+    strike(t, y, friction)
+    record_modes(events, notes, friction)
     return events

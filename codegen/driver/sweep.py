@@ -17,7 +17,7 @@ from .clock_slots import *
 from .contacts import change_modes
 from .control import accept_series, advance, aim, arrive, judge, pause, wrap
 from .passages import note_events, note_rush, take_back
-from .records import Friction, Results, Rows, Step
+from .records import EventWorkspace, Results, Rows, Step
 from .spread import spread
 
 
@@ -148,7 +148,7 @@ def drive(functions, dims, multiplicity, rule, network, first, last, inputs, out
     dense = address(block, first_lane + lane_size * WIDTH)
     seen = address(dense, (dense_size + dims.workspace) * WIDTH)
     crossings = address(seen, observed * WIDTH)
-    friction = Friction(middle, out, clock, steering, network, dims, functions)
+    friction = EventWorkspace(middle, out, clock, steering, network, dims, functions)
 
     # 2. All lanes are empty; tallies of cells that do not continue begin at 0.
     cell = np.full(WIDTH, -1)

@@ -1,6 +1,6 @@
 """Solve M rates = r for the series of the rates, if nodes or links have inertia.
 
-`Row` is the forward substitution and `Unknown` the back substitution of one unknown.  The pattern of M is known when
+`MassRow` is the forward substitution and `Unknown` the back substitution of one unknown.  The pattern of M is known when
 the step is written, and determines the order of elimination.
 """
 
@@ -13,7 +13,7 @@ from synchain.models.mechanics.components import Edge, Node
 from ..program.expressions import ONE, ZERO
 from ..steps.elimination import Entry, plan
 from ..steps.mass_solve import added_masses
-from .series import Constant, Row, Series, Unknown
+from .series import Constant, MassRow, Series, Unknown
 from .series_graph import SeriesGraph, split
 
 UNIT = Constant(ONE)
@@ -43,10 +43,10 @@ def solved(graph: SeriesGraph, masses: Mapping[Entry, Series], right: Mapping[in
     symmetric = all(inner.get((c, r)) == e for (r, c), e in inner.items())
     # substitute forward in the order of elimination, and back in the reverse order
     order = plan(len(coupled), set(inner)).order
-    rows: list[Row] = []
+    rows: list[MassRow] = []
     for r in order:
         row = {k: inner[r, c] for k, c in enumerate(order) if (r, c) in inner}
-        rows.append(Row(right[coupled[r]], row, tuple(rows), symmetric))
+        rows.append(MassRow(right[coupled[r]], row, tuple(rows), symmetric, name=graph.fresh("row")))
     unknowns: dict[int, Unknown] = {}
     for k in reversed(range(len(rows))):
         unknowns[k] = Unknown(rows[k], dict(unknowns))

@@ -525,7 +525,7 @@ def _one_of_two(side: Expression, above: Expression, below: Expression) -> Expre
 
 
 @dataclass(eq=False, slots=True)
-class Row(Series):
+class MassRow(Series):
     """One row of the forward substitution L y = r - (M - M_0) a for the equations M a = r, with M_0 = L U.
 
     Order k of M a = r reads M_0 a_k = r_k - sum_{j=1..k} M_j a_(k-j), so that all orders use the factors of M_0.
@@ -536,7 +536,7 @@ class Row(Series):
 
     right: Series
     entries: dict[int, tuple[Expression, Series]]
-    before: tuple[Row, ...]
+    before: tuple[MassRow, ...]
     symmetric: bool
     unknowns: tuple[Unknown, ...] = ()
     lower: dict[int, Expression] = field(default_factory=dict)
@@ -584,7 +584,7 @@ class Row(Series):
 class Unknown(Series):
     """One unknown a of the back substitution U a = y; `after` holds the unknowns of later rows, by column."""
 
-    row: Row
+    row: MassRow
     after: dict[int, Unknown]
 
     @property
