@@ -234,62 +234,83 @@ def clustered(equations: Equations, clusters: Clusters) -> ClusterVariation:
     equations = equations.projected
     _expect_clusterable(equations)
     by_classes = by_class(equations, clusters.classes)
-    orbit, firsts = collapse(by_classes, clusters.classes), [members[0] for members in clusters.members]
-    # Parameters of links inside clusters that no rate of the orbit contains.
     edges = [{(a, b): e for (a, b), e in layer.edge_of} for layer in by_classes.layers]
-    known = {*orbit.parameters, *orbit.state}
-    more = {s for of_layer in edges for e in of_layer.values() for s in e.parameters if s.name not in known}
-    first = orbit.nodes[0]
-    extended = replace(first, parameters=(*first.parameters, *sorted(more, key=lambda s: s.name)))
-    orbit = replace(orbit, nodes=(extended, *orbit.nodes[1:]))
+    orbit = _with_parameters(collapse(by_classes, clusters.classes), edges)
+    slot_clusters, used = _slots_of(clusters)
+    symbols, strengths = _strengths_of(clusters, used)
 
-    # Slots: as many for each cluster as its largest block needs, and one at least.
-    counts = [max([1, *(block.cluster_of.count(c) for block in clusters.blocks)]) for c in range(orbit.n)]
-    slot_clusters = [c for c, count in enumerate(counts) for _ in range(count)]
-    used = [_slots(range(orbit.n), slot_clusters), *(_slots(b.cluster_of, slot_clusters) for b in clusters.blocks)]
-    matrices = [_coupling_matrices(clusters, None), *(_coupling_matrices(clusters, b) for b in clusters.blocks)]
-    # One strength for each layer and pair of slots that some block couples.
-    symbols: dict[tuple[int, int, int], sp.Symbol] = {}
-    table: list[dict[sp.Symbol, Exact]] = [{} for _ in used]
-    for row, slots, of_layers in zip(table, used, matrices, strict=True):
-        for layer, matrix in enumerate(of_layers):
-            for k, line in zip(slots, matrix, strict=True):
-                for j, number in zip(slots, line, strict=True):
-                    if number != 0:
-                        s = sp.Symbol(f"mode_{layer + 1}_{k + 1}_{j + 1}", real=True)
-                        row[symbols.setdefault((layer, k, j), s)] = number
-    order = sorted(symbols)
-    strengths = tuple(tuple(row.get(symbols[key], Fraction(0)) for key in order) for row in table)
-
-    # Rows of a deviation, slot by slot; contacts have none.
-    sizes = [len(orbit.node_at(c).continuous) for c in slot_clusters]
-    ends = list(accumulate(sizes, initial=0))
+    # rows of a deviation, slot by slot; contacts have none
+    ends = list(accumulate((len(orbit.node_at(c).continuous) for c in slot_clusters), initial=0))
     rows = tuple(tuple(range(a, b)) for a, b in pairwise(ends))
-    entries: dict[tuple[int, int], sp.Expr] = {}
-    jacobian, places = orbit.jacobian(), orbit.places
-    for k, c in enumerate(slot_clusters):
-        for r, row_of in enumerate(rows[k]):
-            for q, column in enumerate(rows[k]):
-                entries[row_of, column] = jacobian.get((places[c][r], places[c][q]), sp.S.Zero)
+    # what links of all layers add to the rates of slot k for a deviation in slot j
+    kinds = [by_classes.kind_of[members[0]] for members in clusters.members]
     pushes: dict[tuple[int, int], sp.Matrix] = {}
-    for layer, k, j in order:
+    for (layer, k, j), symbol in symbols.items():
         c, d = slot_clusters[k], slot_clusters[j]
-        ends_of = by_classes.kind_of[firsts[c]], by_classes.kind_of[firsts[d]]
-        slope = _slope(edges[layer][ends_of], orbit, c, d) * symbols[layer, k, j]
+        slope = _slope(edges[layer][kinds[c], kinds[d]], orbit, c, d) * symbol
         pushes[k, j] = pushes.get((k, j), sp.zeros(*slope.shape)) + slope
-    for (k, j), push in pushes.items():
-        for r, row_of in enumerate(rows[k]):
-            for q, column in enumerate(rows[j]):
-                entries[row_of, column] = entries.get((row_of, column), sp.S.Zero) + push[r, q]
-    matrix_entries = tuple((key, e) for key, e in sorted(entries.items()) if e != 0)
-    if not orbit.forced and any(e.has(TIME) for _, e in matrix_entries):
+
+    matrix = _matrix_of(orbit, slot_clusters, rows, pushes)
+    if not orbit.forced and any(e.has(TIME) for _, e in matrix):
         raise ValueError(
             "cluster states: a link inside a cluster depends on time; expected one of states and parameters"
         )
     events = of_slots(by_classes, orbit, slot_clusters, rows, pushes)
-    parameters = tuple(symbols[key] for key in order)
-    variation = Variation(orbit, ends[-1], matrix_entries, parameters, events)
-    return ClusterVariation(variation, rows, tuple(used), strengths)
+    variation = Variation(orbit, ends[-1], matrix, tuple(symbols.values()), events)
+    return ClusterVariation(variation, rows, used, strengths)
+
+
+def _with_parameters(orbit: Equations, edges: Sequence[dict[tuple[int, int], Edge]]) -> Equations:
+    """Return an orbit that also has the parameters of links inside clusters, which no rate of the orbit contains."""
+    known = {*orbit.parameters, *orbit.state}
+    more = {s for of_layer in edges for e in of_layer.values() for s in e.parameters if s.name not in known}
+    first, *others = orbit.nodes
+    extended = replace(first, parameters=(*first.parameters, *sorted(more, key=lambda s: s.name)))
+    return replace(orbit, nodes=(extended, *others))
+
+
+def _slots_of(clusters: Clusters) -> tuple[list[int], tuple[tuple[int, ...], ...]]:
+    """Return the cluster of each slot, and the slots of the quotient's own motion and of each block.
+
+    A cluster has as many slots as its largest block needs, and one at least.
+    """
+    count = len(clusters.members)
+    sizes = [max([1, *(block.cluster_of.count(c) for block in clusters.blocks)]) for c in range(count)]
+    slot_clusters = [c for c, size in enumerate(sizes) for _ in range(size)]
+    of_blocks = (_slots(block.cluster_of, slot_clusters) for block in clusters.blocks)
+    return slot_clusters, (_slots(range(count), slot_clusters), *of_blocks)
+
+
+def _strengths_of(
+    clusters: Clusters, used: Sequence[tuple[int, ...]]
+) -> tuple[dict[tuple[int, int, int], sp.Symbol], tuple[tuple[Exact, ...], ...]]:
+    """Return a symbol for each layer and pair of slots that some block couples, and the values for each block."""
+    table: list[dict[tuple[int, int, int], Exact]] = [{} for _ in used]
+    for row, slots, block in zip(table, used, (None, *clusters.blocks), strict=True):
+        for layer, matrix in enumerate(_coupling_matrices(clusters, block)):
+            pairs = itertools.product(enumerate(slots), repeat=2)
+            row.update({(layer, k, j): matrix[r][c] for (r, k), (c, j) in pairs if matrix[r][c] != 0})
+    order = sorted({key for row in table for key in row})
+    symbols = {key: sp.Symbol("mode_{}_{}_{}".format(*(place + 1 for place in key)), real=True) for key in order}
+    return symbols, tuple(tuple(row.get(key, Fraction(0)) for key in order) for row in table)
+
+
+def _matrix_of(
+    orbit: Equations,
+    slot_clusters: Sequence[int],
+    rows: Sequence[tuple[int, ...]],
+    pushes: dict[tuple[int, int], sp.Matrix],
+) -> tuple[Entry, ...]:
+    """Return the matrix of the variational equation: the Jacobian of each slot's cluster, and the pushes of links."""
+    entries: dict[tuple[int, int], sp.Expr] = {}
+    jacobian, places = orbit.jacobian(), orbit.places
+    for c, of_slot in zip(slot_clusters, rows, strict=True):
+        for (r, row), (q, column) in itertools.product(enumerate(of_slot), repeat=2):
+            entries[row, column] = jacobian.get((places[c][r], places[c][q]), sp.S.Zero)
+    for (k, j), push in pushes.items():
+        for (r, row), (q, column) in itertools.product(enumerate(rows[k]), enumerate(rows[j])):
+            entries[row, column] = entries.get((row, column), sp.S.Zero) + push[r, q]
+    return tuple((key, e) for key, e in sorted(entries.items()) if e != 0)
 
 
 def _expect_clusterable(equations: Equations) -> None:

@@ -75,6 +75,7 @@ parameters : mapping of str to float, optional
     Parameters of the scene to set.
 """,
 }
+KEYWORDS["orbits"] = "\n".join(KEYWORDS[name].strip() for name in ("average", "starts", "progress"))
 """Descriptions of keywords that are common to several public functions, for their docstrings."""
 
 F = TypeVar("F", bound=Callable[..., object])

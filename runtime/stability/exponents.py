@@ -343,9 +343,7 @@ def exponents(
         layer; gamma is then the eigenvalue of the layer on a mode common to all layers. Layers that do not commute have
         blocks of several differences: alpha is then a real matrix for each layer, -sigma times its matrix on the block
         (`synchain.graphs.clusters`).
-    {average}
-    {starts}
-    {progress}
+    {orbits}
     {parameters}
 
     Returns

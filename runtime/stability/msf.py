@@ -530,9 +530,7 @@ def msf(
         Increasing real strengths alpha = -sigma gamma. By default 241 strengths from 0 on, which cover all modes of the
         network at the values of sigma that the scene sweeps, or up to twice the scene's sigma. If sigma is 0, they end
         at 1.2.
-    {average}
-    {starts}
-    {progress}
+    {orbits}
     {parameters}
 
     Returns
@@ -619,9 +617,7 @@ def plane(
     beta : array_like, shape (b,), optional
         Increasing imaginary parts. Conjugate strengths have the same exponent, so that exponents are
         computed at abs(beta) only.
-    {average}
-    {starts}
-    {progress}
+    {orbits}
     parameters, **more
         Parameters of the scene. A number sets a parameter; an increasing sequence of numbers makes an axis.
 

@@ -188,9 +188,7 @@ def critical(
     between : (float, float)
         Range with one zero: at its ends the exponents have different signs. Along a second parameter the zero is
         followed inside this range.
-    {average}
-    {starts}
-    {progress}
+    {orbits}
     parameters, **more
         Parameters of the scene. A number sets a parameter; an increasing sequence of numbers of one parameter makes a
         curve.

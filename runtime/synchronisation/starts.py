@@ -50,26 +50,13 @@ class Starts:
         count = check_integer("basin: samples", default if samples is None else samples, 1, SAMPLE_LIMIT)
         if count > 1 and not box:
             raise ValueError(f"basin: samples = {samples} at each point of a grid; expected ranges of what is random")
-        # grid of starts: every point, each repeated for all random starts
-        points = np.stack([*np.meshgrid(*(axis.values for axis in grid), indexing="ij")], axis=-1) if grid else None
-        values = np.empty((1, 0)) if points is None else points.reshape(-1, len(grid))
-        if scene.zipped and grid:
-            values = np.array([axis.values for axis in grid]).T
+        values = _points(grid, scene.zipped)
         if len(values) * count > SAMPLE_LIMIT:
             raise ValueError(f"basin: found {len(values) * count} starts; expected at most {SAMPLE_LIMIT}")
-        places = {name: k for k, name in enumerate(scene.equations.state)}
         states = np.tile(np.array(scene.y0, dtype=float), (max(len(perturbed), 1), len(values) * count, 1))
-        # columns of random numbers: one for each state, or for each component if nodes are perturbed in turn
-        holders = {c: scene.equations.holders(c) for c in box}
-        names = [(c, i) for c in box for i in ([None] if perturbed else holders[c]) if i is None or i in chosen]
-        random = np.random.default_rng(seed).random((len(values) * count, len(names)))
-        for (c, i), column in zip(names, random.T, strict=True):
-            low, high = box[c]
-            for row_of, node in enumerate(perturbed) if i is None else [(0, i)]:
-                if node in holders[c]:
-                    states[row_of, :, places[f"{c}_{node + 1}"]] = low + (high - low) * column
+        _fill_at_random(states, scene, box, chosen, perturbed, seed)
         for axis, column in zip(grid, values.T, strict=True):
-            states[:, :, places[axis.name]] = np.repeat(column, count)
+            states[:, :, scene.equations.state.index(axis.name)] = np.repeat(column, count)
         return cls(states, grid, count, perturbed)
 
     @property
@@ -84,6 +71,39 @@ class Starts:
             states = [k for k, state in enumerate(scene.equations.state) if state.rpartition("_")[0] == name]
             ranges[name] = float(np.ptp(self.states[:, :, states]))
         return ranges
+
+
+def _points(grid: Sequence[Axis], zipped: bool) -> np.ndarray:
+    """Return the points (points, axes) of a grid of starts; a single one without coordinates if there is no grid."""
+    if not grid:
+        return np.empty((1, 0))
+    if zipped:
+        return np.array([axis.values for axis in grid]).T
+    return np.stack(np.meshgrid(*(axis.values for axis in grid), indexing="ij"), axis=-1).reshape(-1, len(grid))
+
+
+def _fill_at_random(
+    states: np.ndarray,
+    scene: Scene,
+    box: Mapping[str, Range],
+    chosen: Sequence[int],
+    perturbed: Sequence[int],
+    seed: int,
+) -> None:
+    """Draw the components of a box for the chosen nodes, or for one perturbed node after another.
+
+    Shapes: states (perturbed or 1, starts, dimension).
+    """
+    places = {name: k for k, name in enumerate(scene.equations.state)}
+    holders = {c: scene.equations.holders(c) for c in box}
+    # columns of random numbers: one for each state, or for each component if nodes are perturbed in turn
+    names = [(c, i) for c in box for i in ([None] if perturbed else holders[c]) if i is None or i in chosen]
+    random = np.random.default_rng(seed).random((states.shape[1], len(names)))
+    for (c, i), column in zip(names, random.T, strict=True):
+        low, high = box[c]
+        for row_of, node in enumerate(perturbed) if i is None else [(0, i)]:
+            if node in holders[c]:
+                states[row_of, :, places[f"{c}_{node + 1}"]] = low + (high - low) * column
 
 
 def _nodes(scene: Scene, nodes: str | Sequence[int] | None) -> tuple[tuple[int, ...], tuple[int, ...]]:

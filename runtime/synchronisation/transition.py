@@ -412,9 +412,7 @@ def transition(
         Increasing real strengths of a mode from 0 on, as for `msf`. The sequence is known up to the coupling strength
         at which the fastest mode leaves them. By default they cover all modes at the strengths that the scene sweeps,
         or up to twice the scene's strength.
-    {average}
-    {starts}
-    {progress}
+    {orbits}
     {parameters}
 
     Returns
