@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -70,10 +71,22 @@ def draw_result(
             )
         limits = axes.get_xlim()
         bands(axes, shaded)
+        _open_ends(axes, windows)
         axes.set_xlim(limits)
     failed = int((result.data.status != Status.FINISHED).sum())
     note(axes, "; ".join(filter(None, [remark, failures(failed, result.data.status.size)])))
     return axes
+
+
+def _open_ends(axes: Axes, windows: Any) -> None:
+    """Draw a dashed line and a note where windows end with the computed range (infinite error) and may continue."""
+    for window in getattr(windows, "windows", windows):
+        for end, outside in (("low", "right"), ("high", "left")):
+            edge, error = getattr(window, end, math.inf), getattr(window, f"{end}_error", 0.0)
+            if error == math.inf and math.isfinite(edge):
+                axes.axvline(edge, color=BLACK, linewidth=0.8, linestyle="--", zorder=0.5)
+                axes.text(edge, 0.5, " not computed beyond ", transform=axes.get_xaxis_transform(), rotation=90,
+                          fontsize="x-small", ha=outside, va="center", clip_on=True)  # fmt: skip
 
 
 def _intervals(windows: object) -> list[tuple[float, float]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import Any
@@ -199,6 +200,16 @@ def test_windows_are_shaded_and_leave_the_limits(pair: Callable[..., Result]) ->
     assert shaded.get_xlim() == plain.get_xlim()
     (band,) = shaded.patches
     assert (band.get_x(), band.get_width()) == (0.15, pytest.approx(0.85))
+
+
+def test_a_window_that_ends_with_the_computed_range_has_a_dashed_edge(pair: Callable[..., Result]) -> None:
+    result = pair(axes=SWEPT["error"])
+    window = SimpleNamespace(low=0.15, high=0.25, low_error=0.01, high_error=math.inf)
+    plain, opened = plot(result, windows=[SHADED]), plot(result, windows=[window])
+    (edge,) = (line for line in opened.lines if line.get_linestyle() == "--")
+    assert list(edge.get_xdata()) == [0.25, 0.25]
+    notes = [[text.get_text().strip() for text in axes.texts] for axes in (plain, opened)]
+    assert [each.count("not computed beyond") for each in notes] == [0, 1]
 
 
 def test_errors_that_span_decades_have_a_logarithmic_scale(pair: Callable[..., Result]) -> None:
