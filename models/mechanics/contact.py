@@ -9,6 +9,7 @@ changes.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import sympy as sp
@@ -92,6 +93,15 @@ class FrictionLaw:
     source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
+        values = {sp.Symbol(name, real=True): p.default or 1 for name, p in self.parameters.items()} | {
+            SLIDING: -sp.Rational(1, 7)
+        }
+        if _is_complex(self.force, values):
+            part = next(e for e in sp.postorder_traversal(self.force) if _is_complex(e, values))
+            raise ValueError(
+                f"friction law {self.name!r}: found {part}, which is complex for w < 0; expected a real force of both "
+                "directions; write it with abs(w) and sign(w), as in abs(w)**(3/2)*sign(w)"
+            )
         if _jump(regularise(self.force, SLIDING, sp.S.One), SLIDING):
             raise ValueError(
                 f"friction law {self.name!r}: found a jump at w = 0 in {self.force} that is not written with sign(w); "
@@ -120,6 +130,10 @@ def regularise(law: sp.Expr, argument: sp.Symbol, kappa: sp.Expr) -> sp.Expr:
     Marszal et al., Eur. Phys. J. Special Topics (2016), eq. 5.
     """
     return law.replace(sp.sign, lambda w: 2 * sp.atan(kappa * w) / sp.pi if w.has(argument) else sp.sign(w))
+
+
+def _is_complex(e: sp.Basic, values: Mapping[sp.Symbol, object]) -> bool:
+    return isinstance(e, sp.Expr) and abs(sp.im(e.subs(values).evalf())) > SMALL
 
 
 def _jump(e: sp.Expr, argument: sp.Symbol) -> bool:

@@ -244,6 +244,10 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "law of time": (lambda: friction_law("sign(w)*cos(t)"), "undeclared symbol 't'; declared: w"),
     "static of w": (lambda: friction_law("sign(w)", static="w"), "found friction(…), or w in static"),
+    "complex law": (
+        lambda: friction_law("mu*w**(3/2)", {"mu": 0.3}),
+        "found w**(3/2), which is complex for w < 0; expected a real force",
+    ),
     "order": (lambda: friction_law("mu*sign(w)", {"mu": 1}, order=[("mu", "nu")]), "order names 'nu'"),
     "initial": (lambda: Field({X: -X}, initial={Y: 1}), "initial has the key y; expected x"),
     "no rates": (lambda: Field({}), "found no rates"),
