@@ -6,7 +6,7 @@ import pkgutil
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
-from itertools import pairwise
+from itertools import chain, pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,9 @@ from ..inputs.entry_points import announced
 from ..inputs.frozen import FrozenDict
 from ..inputs.words import Word
 from ..mechanics.components import WEIGHT_NUMBER
-from ..mechanics.contact import ContactModel
-from ..mechanics.impacts import Stop
+from ..mechanics.contact import ContactModel, FrictionLaw, coefficient_at_rest
+from ..mechanics.impacts import Friction, Stop
+from ..mechanics.nondimensional import friction_coefficient, static_coefficient
 from ..mechanics.oscillator import FieldModel
 from ..mechanics.physics import check_masses, check_power
 from ..networks.layers import as_contact, as_coupling, as_groups, as_law, as_layers, as_oscillator
@@ -28,7 +29,7 @@ from ..sweeps.axis import LIMIT, Axis
 from ..sweeps.checked_axes import check_cells, check_draws, check_sweep, read_axes
 from ..sweeps.draw import GRAPH, Draws, drawn_axes, drawn_graph, drawn_nodes, draws
 from ..sweeps.initial_values import SEED_LIMIT, chosen_start, default_start
-from ..sweeps.parameters import at_nodes, drive, parameters, varied
+from ..sweeps.parameters import at_links, at_nodes, drive, parameters, varied
 from .observables import ENDINGS, observables, sections, stop
 from .section import Section
 
@@ -321,8 +322,11 @@ def _numerics(
 def check_restitution(model: Model, parameter_values: Mapping[str, float], axes: Sequence[Axis]) -> None:
     """Raise ValueError for a parameter as restitution that leaves 0 to 1 in a cell: rebounds would gain energy."""
     swept = {axis.name: axis.values for axis in axes}
-    for kind, names in at_nodes(model, {name: name for name in parameter_values}):
-        for each in (event for event in getattr(kind.oscillator.model, "events", ()) if isinstance(event, Stop)):
+    nodes = (
+        (kind.oscillator.model, names) for kind, names in at_nodes(model, {name: name for name in parameter_values})
+    )
+    for part, names in chain(nodes, at_links(model, parameter_values)):
+        for each in (event for event in getattr(part, "events", ()) if isinstance(event, Stop)):
             name = names.get(str(each.restitution))
             for e in () if name is None else swept.get(name, (parameter_values[name],)):
                 if not 0.0 <= e <= 1.0:
@@ -333,11 +337,23 @@ def check_restitution(model: Model, parameter_values: Mapping[str, float], axes:
 
 def check_friction(model: Model, parameter_values: Mapping[str, float], axes: Sequence[Axis], zipped: bool) -> None:
     """Raise ValueError if static friction is below the friction of slow slip in a cell: no motion would be possible."""
-    if model.contact != ContactModel.SET_VALUED:
-        return
     swept = {axis.name: axis.values for axis in axes}
-    for kind, names in at_nodes(model, {name: name for name in parameter_values}):
-        for pair in kind.friction.order if kind.friction else ():
+    nodes = (
+        (law, names)
+        for kind, names in at_nodes(model, {name: name for name in parameter_values})
+        if model.contact == ContactModel.SET_VALUED
+        for law in (kind.friction, *kind.oscillator.laws.values())
+    )
+    links = (
+        (event.law, names)
+        for coupling, names in at_links(model, parameter_values)
+        for event in coupling.events
+        if isinstance(event, Friction)
+    )
+    for law, names in chain(nodes, links):
+        if not isinstance(law, FrictionLaw) or not law.parameters.keys() <= names.keys():
+            continue  # no law, or parameters of a link that differ between nodes, which the equations refuse
+        for pair in law.order:
             low, high = (names[name] for name in pair)
             lows, highs = (swept.get(name, (parameter_values[name],)) for name in (low, high))
             # On a grid compare the largest value of one with the smallest of the other; zipped axes value by value.
@@ -345,5 +361,26 @@ def check_friction(model: Model, parameter_values: Mapping[str, float], axes: Se
             for a, b in zip(lows, highs, strict=True) if together else ((max(lows), min(highs)),):
                 if b < a:
                     raise ValueError(
-                        f"friction {kind.friction}: found {high} = {b!r} below {low} = {a!r}; expected {low} <= {high}"
+                        f"friction {law}: found {high} = {b!r} below {low} = {a!r}; expected {low} <= {high}"
+                    )
+        if (static := static_coefficient(law)) is not None:
+            w = sp.Dummy("w", positive=True)
+            slow = coefficient_at_rest(friction_coefficient(law, ContactModel.SET_VALUED)(w), w)
+            used = {s: names[s.name] for s in sorted(static.free_symbols | slow.free_symbols, key=str)}
+            values = [tuple(swept.get(name, (parameter_values[name],))) for name in used.values()]
+            longest = max(map(len, values), default=1)
+            # Zipped axes value by value; on a grid compare its corners, which suffice for monotone coefficients.
+            together = zipped and len({len(v) for v in values} - {1}) == 1
+            cells = (
+                zip(*(v * (longest // len(v)) for v in values), strict=True)
+                if together
+                else product(*((min(v), max(v)) for v in values))
+            )
+            for cell in cells:
+                b, a = (e.xreplace(dict(zip(used, map(sp.Float, cell), strict=True))).evalf() for e in (static, slow))
+                if b.is_real and a.is_real and b < a * (1 - 1e-12):
+                    at = ", ".join(f"{name} = {value:.6g}" for name, value in zip(used.values(), cell, strict=True))
+                    raise ValueError(
+                        f"friction {law}: found the static coefficient {float(b):.6g} below {float(a):.6g} of slow slip"
+                        f"{at and f' at {at}'}; expected at least as much"
                     )

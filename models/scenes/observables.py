@@ -14,6 +14,7 @@ from ..inputs.checks import check_table, check_text, short_repr, suggestion
 from ..inputs.frozen import FrozenDict
 from ..inputs.names import ATTRIBUTES, NodeName, expect_free
 from ..mechanics.components import TIME
+from ..mechanics.impacts import Stop
 from ..networks.energy_terms import energy_of
 from ..networks.model import Model
 from ..sweeps.parameters import varied
@@ -76,6 +77,11 @@ def stop(model: Model, values: Mapping[str, float], text: object) -> str | None:
         raise ValueError(
             f"stop: found {function}, which each node has; expected one function, e.g. of x_1 or of nodes.maximum(x)"
         )
+    if events := [event for coupling, _ in model.linked for event in getattr(coupling, "events", ())]:
+        found = "stops" if all(isinstance(event, Stop) for event in events) else "contacts"
+        raise ValueError(f"stop: found {found} in links; expected links without events; leave stop out")
+    if any(isinstance(event, Stop) for kind in model.kinds for event in getattr(kind.oscillator.model, "events", ())):
+        raise ValueError("stop: found stops of nodes; expected smooth equations; leave stop out")
     if model.unlinked.sticks:
         raise ValueError("stop: found set-valued contacts; expected smooth equations; take contact 'atan'")
     return str(sp.sstr(function, order="lex"))

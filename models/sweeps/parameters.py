@@ -213,6 +213,16 @@ def at_nodes(model: Model, values: Mapping[str, T]) -> Iterator[tuple[NodeKind, 
             yield model.kinds[model.kind_of[i]], at_node
 
 
+def at_links(model: Model, values: Mapping[str, object]) -> Iterator[tuple[Any, dict[str, str]]]:
+    """Yield each coupling with events, and the names of its parameters' values at each link; once if all are equal."""
+    for coupling, graph in model.linked:
+        if getattr(coupling, "events", ()):
+            differing = {name: model.link_names(name) for name in coupling.parameters if name not in values}
+            for i, j, _ in graph.links if differing else islice(graph.links, 1):
+                at_link = {p: str(differing[p].get((i, j), p)) if p in differing else p for p in coupling.parameters}
+                yield coupling, {p: name for p, name in at_link.items() if name in values}
+
+
 def drive(model: Model, values: Mapping[str, float]) -> Drive:
     """Return the drive of a model at parameter values."""
     timed = any(coupling.forced for coupling, _ in model.linked)

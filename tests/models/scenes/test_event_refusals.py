@@ -31,6 +31,8 @@ def scene(node: Any, coupling: Any = None, **given: Any) -> sc.Scene:
 HIT = body(sc.Stop(sp.Rational(1, 2) - x, 0.7), force=sp.cos(t))
 DROP = slider(force=sc.friction(sp.Rational(1, 5) - v), friction="coulomb_static")
 BOUNCE = body(sc.Stop(x, e), potential=x, parameters={e: 0.5}, initial={x: 1})
+KNOCK = sc.Potential(0, {e: 0.9}, events=[sc.Stop("x_j - x_i + 1", restitution=e)])
+WEAK = sc.friction_law("a*sign(w)/(1 + abs(w))", {"a": 0.4, "b": 0.3}, static="b", name="weak")
 
 REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "a product of signs": (
@@ -65,6 +67,29 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "a parameter above one": (lambda: scene(BOUNCE, parameters={"e": 1.5}), r"stop x: found the restitution e = 1\.5"),
     "an axis below zero": (lambda: scene(BOUNCE, axes={"e": [0.5, -0.25]}), r"stop x: found the restitution e = -0\.25"),
     "one node above one": (lambda: scene(BOUNCE, "spring", parameters={"e_2": 2}), "stop x: found the restitution e_2 = 2"),
+    "a link above one": (
+        lambda: scene("harmonic", KNOCK, parameters={"e": 1.5}), r"stop .*: found the restitution e = 1\.5; expected a number"
+    ),
+    "one link above one": (lambda: scene("harmonic", KNOCK, axes={"e_1_2": [0.5, 1.25]}), r"found the restitution e_1_2 = 1\.25"),
+    "static below kinetic": (
+        lambda: scene(slider(force=sc.friction(-v), friction=WEAK)),
+        r"friction weak: found the static coefficient 0\.3 below 0\.4 of slow slip at a = 0\.4, b = 0\.3; expected at least",
+    ),
+    "static below kinetic in one cell": (
+        lambda: scene(slider(force=sc.friction(-v), friction=WEAK), axes={"a": [0.3, 0.2], "b": [0.4, 0.25]}),
+        r"0\.25 below 0\.3 of slow slip at a = 0\.3, b = 0\.25",
+    ),
+    "static below kinetic in an event": (
+        lambda: scene(body(sc.Friction(-v, law=WEAK), contact="set-valued")), r"friction weak: found the static coefficient 0\.3 below 0\.4"
+    ),
+    "static below kinetic in a link": (
+        lambda: scene("harmonic", sc.Potential(0, events=[sc.Friction("v_j - v_i", load="W", law=WEAK)])),
+        r"friction weak: found the static coefficient 0\.3 below 0\.4",
+    ),
+    "a stop condition beside stops of links": (
+        lambda: scene("harmonic", KNOCK, stop="x_1 - 2"), "stop: found stops in links; expected links without events"
+    ),
+    "a stop condition beside stops": (lambda: scene(HIT, stop="x_1 - 2"), "stop: found stops of nodes; expected smooth equations"),
     "a start behind a guard": (
         lambda: sc.run(scene(sc.Field({x: 1}, initial={x: 1}, events=[sc.Reset(x - 1, {x: 0})]))),
         "found node 1 with the guard x - 1 at or above 0; expected a start in front of it",
@@ -103,6 +128,14 @@ def test_functions_of_one_sign_slide(rate: sp.Expr) -> None:
     node = sc.Field({x: rate}, contact="set-valued", initial={x: 1})
     end = sc.run(scene(node), show_progress=False).end
     np.testing.assert_array_equal(end.values.ravel(), [0.0, 0.0])
+
+
+def test_static_friction_may_equal_that_of_slow_slip() -> None:
+    node = slider(force=sc.friction(-v), friction=WEAK)
+    axes = {"a": [0.3, 0.2], "b": [0.3, 0.2]}
+    assert scene(node, axes=axes, zipped=True).zipped
+    with pytest.raises(ValueError, match=r"0\.2 below 0\.3"):
+        scene(node, axes=axes)
 
 
 def test_cells_that_end_in_words() -> None:
