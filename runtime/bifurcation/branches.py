@@ -370,7 +370,7 @@ def _bifurcation(problem: Equilibria | Cycles, located: Located) -> Bifurcation:
     return Bifurcation(
         point.value,
         kind,
-        abs(critical.growth[located.index]) / critical.scale,
+        abs(critical.growth[located.index]) / located.scale,
         solution,
         problem.names[-1],
         point.length,

@@ -55,6 +55,7 @@ class Located:
     kind: BifurcationKind
     point: Point  # with critical values
     index: int  # of the critical value
+    scale: float  # size of the critical values on the step
     multiplicity: int = 1  # of values or pairs that pass together
 
     @property
@@ -94,6 +95,11 @@ class BranchStep:
             critical = self.problem.critical(point.z)
             self.points[distance] = replace(point, critical=critical, length=self.before.length + distance)
         return self.points[distance]
+
+    def scale(self, point: Point) -> float:
+        """Return the size of the critical values; a single value, which is zero at a fold, is measured at both ends."""
+        one = len(_critical(point).values) == 1
+        return max(_critical(each).scale for each in ((self.before, self.after) if one else (point,)))
 
     def zero(self, test: Callable[[Point], float]) -> float:
         """Return the distance at which a function of the solution passes zero."""
@@ -148,20 +154,21 @@ def _found(step: BranchStep, indices: range, turned: bool) -> list[tuple[float, 
     if turn is not None and not any(each.kind is BifurcationKind.FOLD for _, each in located):
         critical = _critical(step.at(turn))
         touching = int(abs(critical.growth).argmin())
-        if abs(critical.growth[touching]) > TOUCHING * critical.scale:
+        scale = step.scale(step.at(turn))
+        if abs(critical.growth[touching]) > TOUCHING * scale:
             return None  # two changes of the number cancel on this step
         near = [h for h, each in located if abs(h - turn) < TOGETHER * length and not abs(each.critical.imag) > 0.0]
         if not near:
             # Of few eigenvalues of a large network one may pass although the number of growing ones stays the same.
             for beside in BESIDE:
                 sides = [_nearest(step.at(min(max(turn + d * length, 0.0), length))) for d in (-beside, beside)]
-                if min(map(abs, sides)) > CLEAR * critical.scale:
+                if min(map(abs, sides)) > CLEAR * scale:
                     break
             kind = problem.kind(complex(critical.values[touching].real), sides[0] * sides[1] < 0.0)
             point = step.at(turn)
             if kind is not BifurcationKind.FOLD:  # a flat turn has no digits in either form: take the better one
                 point = min((point, step.turning_point(turn)), key=lambda each: abs(_nearest(each)))
-            located.append((turn, Located(kind, point, touching)))
+            located.append((turn, Located(kind, point, touching, scale)))
     return [*_together(located, length)]
 
 
@@ -180,12 +187,12 @@ def _passing(step: BranchStep, indices: range, turn: float | None) -> Iterator[t
         paired = abs(critical.values[index].imag) > REAL * critical.scale
         turned = False
         if turn is not None and not paired:  # the value that passes is neutral at the turn
-            turned = abs(float(_critical(step.at(turn)).growth[index])) <= TOUCHING * critical.scale
+            turned = abs(float(_critical(step.at(turn)).growth[index])) <= TOUCHING * step.scale(step.at(turn))
         if turned and turn is not None:
             distance = turn  # a fold is located better by the turn: the value is a square root of the parameter
         value = complex(critical.values[index])
         kind = step.problem.kind(value if paired else complex(value.real), turned)
-        yield distance, Located(kind, step.at(distance), index)
+        yield distance, Located(kind, step.at(distance), index, step.scale(step.at(distance)))
         index += 2 if paired else 1
 
 
