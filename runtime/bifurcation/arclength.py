@@ -48,6 +48,10 @@ ASIDE = 0.03
 KINK = 1.0 / 64.0
 """Longest step across a kink of the branch (a choice)."""
 
+AHEAD = 0.1
+"""Least length of a step that ends on a bound, relative to that of its guess: a shorter one leads to another branch (a
+choice)."""
+
 SHORTEST = 1e-9
 """Shortest step; the branch is lost if it must be shorter (a choice)."""
 
@@ -216,7 +220,9 @@ def _advance(
                     ahead = (weights * after.tangent) @ (weights * before.tangent)
                     length = float((weights * (after.z - before.z)) @ (weights * before.tangent))
                     turned = after.tangent * math.copysign(1.0, ahead)
-                    after = Point(after.z, turned, after.corrections)
+                    # Newton's method may have met the branch that is left, at no distance along the tangent.
+                    on_branch = length > AHEAD * share * step
+                    after = Point(after.z, turned, after.corrections) if on_branch else None
                     end = f"{('period', *problem.names)[place]} = {bound:.8g}"
             if after is not None:
                 critical = problem.critical(after.z)

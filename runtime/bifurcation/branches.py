@@ -251,11 +251,15 @@ def _begin(
         tangent = np.zeros(len(problem.point))
     problem.set_ranges(np.array([size]))
     if leaves:
+        if isinstance(problem, Equilibria):
+            problem.scale_along(tangent[: problem.size])
         return problem, Point(problem.point, tangent / float(np.linalg.norm(problem.weights * tangent)), 0)
     tangent[-1] = sign / problem.weights[-1]
     found = correct(problem, problem.point, tangent)
     if found is None:
         raise ArithmeticError(f"follow: found no solution at {problem.names[-1]} = {problem.point[-1]:g} near `first`")
+    if isinstance(problem, Equilibria):
+        problem.scale_along(found.tangent[: problem.size])
     z, tangent = problem.accept(found.z, found.tangent)
     return problem, Point(z, tangent, 0, problem.critical(z))
 
@@ -405,7 +409,7 @@ def _joined(name: str, parts: list[Part]) -> Branch:
     if lost:
         warn(
             f"follow: found no solution and no bifurcation beyond {name} = {digits_of(lost)}; expected the "
-            "branch to go on, or to end at a bifurcation; try a smaller largest_step"
+            "branch to go on, or to end at a bifurcation; try a smaller largest_step, or states scaled to the order of 1"
         )
     growing = np.array([solution.growing for _, solution in points])
     return Branch(

@@ -32,6 +32,12 @@ NOISE = 1e-14
 LEAST_SCALE = 0.1
 """Least scale of a component in lengths, relative to that of the largest component (a choice)."""
 
+SHRINK = 64.0
+"""Factor by which the scale of states near zero is lowered, and the ratio of rates at which it is low enough (a choice)."""
+
+ORIGIN = 1e-12
+"""States that are smaller than this part of the scale are zero to rounding (a choice)."""
+
 TINY = 1e-8
 """A parameter without bounds that is smaller does not set its own length (a choice)."""
 
@@ -96,6 +102,30 @@ class Equilibria:
         self.weights = np.zeros(len(self.point))
         self.weights[: self.size] = 1.0 / (np.sqrt(self.size) * np.repeat(scales, counts))
         self.weights[len(self.weights) - len(self.names) :] = 1.0 / np.where(self.ranges > 0.0, self.ranges, 1.0)
+
+    def scale_along(self, direction: np.ndarray) -> None:
+        """Scale states near zero by the equations along a direction (states,) in which the branch leaves."""
+        if not direction.any():
+            return
+        state, _, values = self.split(self.point)
+        network, by_parameter = self.network.at(values), self.by_parameters[0].at(values)
+        unit, scale = direction / np.abs(direction).max(), 1.0
+        rates, slope = network.rates(state), network.jacobian(state) @ unit
+        shift, slope_shift = by_parameter.rates(state), by_parameter.jacobian(state) @ unit
+        # The branch is where the nonlinear terms balance the change of the rates by the parameter: x^2 = r S^2 for
+        # r x - x^3/S^2.  Further out the nonlinear terms are larger.
+        while scale > np.finfo(float).tiny:
+            change = self.ranges[0] * np.abs(shift + scale * slope_shift).max()
+            with np.errstate(all="ignore"):
+                nonlinear = np.abs(network.rates(state + scale * unit) - rates - scale * slope).max()
+            if nonlinear <= SHRINK * change:
+                break
+            scale /= SHRINK
+        else:  # the parameter changes no rate in this direction
+            return
+        if np.abs(state).max() <= ORIGIN * scale:
+            self.component_scales[:] = scale
+            self._weigh()
 
     @cached_property
     def higher(self) -> tuple[Linearised, Linearised]:

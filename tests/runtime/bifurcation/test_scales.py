@@ -196,3 +196,53 @@ def test_every_field_of_a_scene_is_obeyed_refused_or_of_no_matter(
     assert left.state[0] == pytest.approx(-1.0, abs=0.3)
     timed = duffing().replace(time_unit="time", transient=50 * duffing().period)
     np.testing.assert_allclose(sc.periodic_orbit(timed).state, orbit.state, atol=1e-10)
+
+
+SIZES = [1.0, 1e-3, 1e-6]
+
+
+def resting(rate: str, size: float, name: str, value: float, start: float = 0.0) -> sc.results.Equilibrium:
+    """The equilibrium of x' = rate, with states of a size."""
+    field = sc.Field({"x": rate}, parameters={"S": size, name: value})
+    return sc.equilibrium(sc.Scene(field, initial={"x": start * size}))
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_branches_at_a_branch_point_follow_the_unit_of_the_state(size: float) -> None:
+    """x = +-S sqrt(r), and S^2 (1 +- sqrt(1 + 4 r))/2 = x^2 with folds at r = -1/4."""
+    for rate, folds in (("r*x - x**3/S**2", []), ("r*x + x**3/S**2 - x**5/S**4", [-0.25, -0.25])):
+        (point,) = sc.follow(resting(rate, size, "r", -1.0), "r", to=1.0).points["branch point"]
+        branch = sc.follow(point, "r", within=(-1.0, 1.0))
+        assert not branch.lost
+        assert branch.ends == ("r = 1", "r = 1")
+        states = np.array([each.state[0] for each in branch]) / size
+        expected = states**4 - states**2 if folds else states**2
+        np.testing.assert_allclose(branch.values, expected, atol=1e-9)
+        assert len(states) > 30
+        assert states[0] == pytest.approx(-states[-1], rel=1e-9)
+        assert [each.value for each in branch.bifurcations] == pytest.approx(folds, abs=1e-9)
+        assert {str(each.kind) for each in branch.bifurcations} == ({"fold"} if folds else set())
+        assert all(each.residual < 1e-5 for each in branch.bifurcations)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_folds_of_one_state_follow_its_unit(size: float) -> None:
+    """A single eigenvalue is zero at a fold, and gives no unit there."""
+    branch = sc.follow(resting("F*S + x - x**3/S**2", size, "F", 0.0, -1.5), "F", within=(-1.0, 1.0))
+    fold = 2.0 / 27.0**0.5
+    assert [each.value for each in branch.bifurcations] == pytest.approx([fold, -fold], abs=1e-12)
+    for end in (size, 1.0):  # from a state at zero
+        branch = sc.follow(resting("r - x + 4*x**3/S**2", size, "r", 0.0), "r", to=end)
+        assert [each.value for each in branch.bifurcations] == pytest.approx([fold * size / 2.0], rel=1e-9)
+        assert not branch.lost
+        assert branch.bifurcations[0].residual < 1e-5
+
+
+def test_a_beam_buckles_by_millimetres() -> None:
+    """(100 - P) x + 1e8 x^3 = 0 in metres: 1 mm at P = 200."""
+    beam = sc.Field({"x": "v", "v": "(P - 100)*x - 1e8*x**3 - v"}, parameters={"P": 0})
+    straight = sc.equilibrium(sc.Scene(beam, initial={"x": 0.0}))
+    (point,) = sc.follow(straight, "P", to=200.0).points["branch point"]
+    branch = sc.follow(point, "P", to=200.0)
+    assert sorted(branch[k].state[0] for k in (0, -1)) == pytest.approx([-1e-3, 1e-3], rel=1e-9)
+    assert [each.stable for each in branch].count(False) == 1
