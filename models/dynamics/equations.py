@@ -24,7 +24,7 @@ from ..interactions.separation import separated
 from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Block, Edge, Node
 from ..mechanics.events import Event
-from ..mechanics.rows import Row
+from ..mechanics.rows import Law, Row
 from .parts import Part, PartLink, local, of_link, part_template
 
 Ends = tuple[int, int]
@@ -658,6 +658,7 @@ def check(eq: Equations) -> None:
     if eq.joined:
         _check_joined(eq)
     _check_links(eq)
+    _check_stops(eq)
     _check_numbered(eq)
 
     # Each name has one meaning.
@@ -685,6 +686,23 @@ def _check_friction(eq: Equations) -> None:
         raise ValueError(
             f"links with set-valued friction: found {found}; expected one layer of links of the states; use contact 'atan'"
         )
+
+
+def _check_stops(eq: Equations) -> None:
+    """Raise ValueError for links that change the rate of a coordinate in the gap of a stop.
+
+    The impact reverses the speed of the gap by the velocities of the node alone.
+    """
+    for (target, _), edge in (pair for layer in eq.layers for pair in layer.edge_of):
+        node = eq.nodes[target]
+        moved = {s for s, e in zip(node.state, edge.rhs, strict=False) if e != 0}
+        for row in node.rows:
+            if row.law is Law.STOP and (both := row.level.free_symbols & moved):
+                name = min(s.name for s in both)
+                raise ValueError(
+                    f"stops: found a link that changes the rate of {name}, which is in the gap {row.level}; expected forces, "
+                    "which change velocities"
+                )
 
 
 def _check_joined(eq: Equations) -> None:

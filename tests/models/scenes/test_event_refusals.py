@@ -35,6 +35,10 @@ KNOCK = sc.Potential(0, {e: 0.9}, events=[sc.Stop("x_j - x_i + 1", restitution=e
 WEAK = sc.friction_law("a*sign(w)/(1 + abs(w))", {"a": 0.4, "b": 0.3}, static="b", name="weak")
 
 REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
+    "a link that moves the coordinate of a gap": (
+        lambda: scene(BOUNCE, "x->x").equations,
+        "stops: found a link that changes the rate of x, which is in the gap x; expected forces, which change velocities",
+    ),
     "a product of signs": (
         lambda: sc.Field({x: -sp.sign(x) * sp.sign(y), y: -2 * sp.sign(y) - sp.sign(x)}, contact="set-valued"),
         r"sliding along x = 0 and y = 0 at once is not defined by sign\(x\)\*sign\(y\); write a sum, or contact='sign'",
