@@ -280,6 +280,9 @@ def firing(pick: Pick) -> Drawn:
 JOINED = 20
 """Structures from this one on have contacts and stops in their links."""
 
+LINK = 99
+"""Owner of the rows of links."""
+
 
 @functools.lru_cache(maxsize=4)
 def structure(seed: int) -> Structure:
@@ -326,6 +329,18 @@ def structure(seed: int) -> Structure:
                 push[i * d + c] = sp.sympify(e).xreplace(here | {row.mode: mode})
             sets = tuple((i * d + c, e.xreplace(here)) for c, e in row.sets)
             rows.append(Row(row.law, row.level.xreplace(here), tuple(push) if row.push else (), row.ratio, mode, sets, (i, k)))  # fmt: skip
+    for i, j in pairs:
+        ends = [(j, 1), (i, -1)]  # the speed and the gap of a link are those of its second end less those of its first
+        if rubs:
+            push = [sp.S.Zero] * (n * d)
+            for m, side in ends:
+                push[m * d + target] = -side * load
+            rows.append(
+                Row("sign", sp.Add(*(side * states[m][target] for m, side in ends)), tuple(push), owner=(LINK, 0))
+            )
+        if stops:
+            gap = sp.Add(sp.Rational(3, 5), *(side * states[m][linked] for m, side in ends))
+            rows.append(Row("stop", gap, ratio=bounce, owner=(LINK, 1)))
     table = [
         *force,
         *(e for block in blocks for e in block),
@@ -423,6 +438,10 @@ def check(seed: int, number: int) -> tuple[str, str]:
     times = [t for t, *_ in right.events]
     late = float(abs(np.sort(times) - np.sort(columns[0])).max(initial=0.0)) if len(times) == count else np.inf
     mine = [(i + 1, a + 1, abs(old), abs(new)) for (_, _, old, new), (i, a) in zip(right.events, owners, strict=True)]
+    in_links = columns[2] > len(
+        structure(seed).node.rows
+    )  # after the rows of the link's source; stops are not compared
+    columns[1], columns[2] = np.where(in_links, LINK + 1, columns[1]), np.where(in_links, 1, columns[2])
     theirs = [tuple(map(int, map(abs, each))) for each in zip(*columns[1:], strict=True)]
     same = sorted(mine) == sorted(theirs) and late < 1e3 * allowed + 1e-9
     return ("right" if same else "EVENTS"), f"{words}, {count} recorded, late by {late:.3g}"
