@@ -197,10 +197,11 @@ class Ladder:
         """
         rtol, atol = tolerances(self.scene, self.equations, rows.numbers)
         if self.scene.given["atol"] is None:
-            small = np.abs(rows.start).max(axis=1) < 0.1
+            start = np.abs(rows.start[:, self.moving]).max(axis=1)
+            small = start < 0.1
             if small.any():
                 few = rows.take(small)
-                size = np.maximum(np.abs(few.start).max(axis=1), self.templates.reach(few.start, few.numbers))
+                size = np.maximum(start[small], self.templates.reach(few.start, few.numbers))
                 atol[small] *= scale_of_atol(size)
         return rtol, atol
 
@@ -209,6 +210,14 @@ class Ladder:
         rtol, atol = self.tolerances(rows)
         noise = rtol[:, None] * np.minimum(np.abs(state), self.longest) + atol[:, None]
         return self.templates.paces(state, rows.numbers, time, rows.spans[:, SpanColumn.LONGEST], noise)
+
+    @cached_property
+    def moving(self) -> np.ndarray:
+        """Whether each state (dimension,) moves; modes of events are -1, 0 or 1 in any unit."""
+        components, modes = self.equations.components, self.equations.modes
+        return np.repeat(
+            [name not in modes for name in components], [len(self.equations.holders(c)) for c in components]
+        )
 
     @cached_property
     def longest(self) -> np.ndarray:

@@ -211,3 +211,17 @@ def test_a_ball_is_thrown_off_a_table_and_lands(integrator: str, strength: float
             x, _, mode = end(given.replace(window=float(t))).ravel()
             assert mode == (t < land)
             assert x == pytest.approx(thrown(t) if t < land else size * np.sin(w * t), abs=10 * rtol)
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1e-6])
+def test_impacts_do_not_depend_on_the_unit_of_length(unit: float) -> None:
+    """The default atol follows the start of the coordinates; the mode of a stop is 1 in any unit."""
+
+    def impacts(length: float) -> np.ndarray:
+        stop = sc.Stop(Y - length * sp.sin(100 * T) / 500, restitution=R(3, 10))
+        shaken = sc.Lagrangian(V**2 / 2, G * Y, coordinates={Y: V}, parameters={G: 9.81 * length}, events=[stop])
+        given = {"initial": {"y": [length / 100]}, "record": ["events"], "rtol": 1e-8, "atol": None}
+        found = sc.run(scene(shaken, 0.5, "taylor", **given), show_progress=False)
+        return found.events.event_time.values.ravel()
+
+    np.testing.assert_allclose(impacts(unit), impacts(1.0), rtol=1e-5)
