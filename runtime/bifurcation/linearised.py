@@ -19,7 +19,7 @@ from scipy import sparse
 from synchain.models.dynamics.equations import Equations, Layer
 from synchain.models.graphs.links import Link
 from synchain.models.inputs.names import NodeName
-from synchain.models.mechanics.calculus import derivative
+from synchain.models.mechanics.calculus import NOTHING, derivative
 from synchain.models.mechanics.components import Block, Edge
 
 Values = Callable[..., list[float | np.ndarray]]
@@ -208,7 +208,9 @@ def _slopes(template: TermTemplate) -> list[Block]:
     """Return the derivatives of the rates by the states of each array of indices."""
     ends = np.cumsum([0, *(each.shape[1] for each in template.indices)])
     groups = [template.states[a:b] for a, b in pairwise(ends)]
-    return [tuple(tuple(derivative(e, s) for s in group) for e in template.rates) for group in groups]
+    # an infinite slope at rest is refused, unlike one that a motion only passes (NOTHING)
+    exact = {NOTHING: sp.S.Zero}
+    return [tuple(tuple(derivative(e, s).xreplace(exact) for s in group) for e in template.rates) for group in groups]
 
 
 def _node_templates(equations: Equations) -> Iterator[TermTemplate]:

@@ -71,7 +71,7 @@ def test_decimals_are_exact() -> None:
         (lambda: Rates({"theta": "W*(theta_j -"}), "unreadable expression"),
         (lambda: Rates({"theta": "W*(theta_j - theta)"}), "undeclared symbol 'theta'"),
         (lambda: Rates({SOURCE.theta: W}), "found the rate of 'theta_j'; expected a state of the target"),
-        (lambda: Rates({TARGET.theta: sp.S.Zero * W}), "nothing uses the weight"),
+        (lambda: Rates({TARGET.theta: sp.S.Zero * W}), "the rate of 'theta' is 0; expected a function"),
         (lambda: Rates({TARGET.theta: W, TARGET.p: sp.S.Zero}), "the rate of 'p' is 0"),
         (lambda: Rates({"V": "g*W*(V_j - V_i)/C"}, {"g": 1}), "give it a default, or write C_i for what the node has"),
         (lambda: Rates({TARGET.theta: K * W}), "undeclared symbol 'K'; expected .* give it a default"),

@@ -515,7 +515,7 @@ def test_wrong_use_is_said_before_anything_is_computed(
 def test_equations_without_modes_are_refused_before_anything_is_computed(
     asked: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def mode(equations: Any, plane: bool = False) -> Any:
+    def mode(equations: Any, plane: bool = False, **_: Any) -> Any:
         raise ValueError(f"no synchronous state, plane {plane}")
 
     monkeypatch.setattr(orbits, "mode", mode)

@@ -178,9 +178,6 @@ def test_certified_runs_of_two_layers_have_the_same_exponents() -> None:
     certified = run(scene, certified=True, show_progress=False, width=1, **axes)
     result = plane(scene, starts=4, transient=300, **axes)
     np.testing.assert_allclose(certified.data.transversal_exponent.values, result.exponent, atol=1e-9)
-    apart = scene.replace(links=[(SPRING, ring(4)), (DAMPER, star(4))])
-    with pytest.raises(ValueError, match="do not commute"):
-        run(apart, certified=True, show_progress=False, width=1, **axes)
 
 
 def rossler(strengths: np.ndarray) -> tuple[OrbitProblem, np.ndarray]:
