@@ -19,15 +19,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 PACKAGES = ("models", "codegen", "runtime")
-OFFERED = ("models", "runtime", "codegen.integrators", "codegen.simd", "codegen.export")  # pages of the reference
 ROOT = Path(__file__).resolve().parent.parent
 
 
 def public_names() -> set[tuple[str, str]]:
     """Modules and qualified names of all that the reference shows."""
     names = set()
-    for package in OFFERED:
-        module = importlib.import_module(f"synchain.{package}")
+    front = importlib.import_module("synchain")
+    shown = (*front.MODULES, "codegen.integrators", "codegen.simd", "codegen.export")
+    for module in (front, *(importlib.import_module(f"synchain.{name}") for name in shown)):
         for value in (getattr(module, name) for name in module.__all__):
             if inspect.isclass(value):
                 for base in value.__mro__:
