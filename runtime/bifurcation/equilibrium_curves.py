@@ -242,7 +242,11 @@ class HopfCurve(EigenvectorCurve):
         def bautin(point: Point) -> float:
             (size, states), frequency = (self.size, self.base.size), self.frequency(point.z)
             a, u = point.z[size : size + states], point.z[size + states : size + 2 * states]
-            return first_lyapunov_coefficient(self.base, self.equilibrium(point.z), a - 1j * u / frequency, frequency)
+            z, others = self.equilibrium(point.z), self.critical(point.z)
+            coefficient = first_lyapunov_coefficient(self.base, z, a - 1j * u / frequency, frequency)
+            # At a zero-Hopf point the coefficient has a pole. A factor that passes zero there, as det J does, removes it.
+            distance = np.abs(others.values).min() if len(others.values) else 1.0
+            return float((-1.0) ** (others.growth > 0.0).sum() * distance * coefficient)
 
         return {"Bautin": bautin}
 

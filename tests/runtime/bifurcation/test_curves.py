@@ -105,6 +105,21 @@ def test_a_bautin_point_in_closed_form(tmp_path: Path) -> None:
     assert opened.special[0].kind == "Bautin"
 
 
+def test_a_pole_of_the_lyapunov_coefficient_is_no_bautin_point() -> None:
+    """z' = m + z^2 - r^2, r' = r (n + z + c r^2) has Hopf points at z = -n; there r^2 = 2 z dz, so the coefficient
+    is proportional to c + 1 / (2 z): a zero at z = -1 / (2 c), and a pole at the zero-Hopf point z = 0.
+    """
+    square, inner = "(x**2 + y**2)", "(n + z + c*(x**2 + y**2))"
+    rates = {"x": f"{inner}*x - y", "y": f"x + {inner}*y", "z": f"m + z**2 - {square}"}
+    node = sc.Field(rates, parameters={"m": -1, "n": 0.5, "c": -1})
+    branch = sc.follow(sc.equilibrium(sc.Scene(node, None, initial={"x": 0, "y": 0, "z": -1})), "n", within=(0, 2))
+    curve = sc.follow(branch.points["Hopf"][0], ("m", "n"), within={"n": (-2, 2)})
+    kinds = {point.kind: point.values for point in curve.special}
+    assert sorted(point.kind for point in curve.special) == ["Bautin", "extreme m", "zero-Hopf"]
+    np.testing.assert_allclose(kinds["zero-Hopf"], 0, atol=1e-10)
+    np.testing.assert_allclose(kinds["Bautin"], (-0.25, -0.5), rtol=1e-9)
+
+
 def test_folds_of_a_grid_with_a_shift_scale_with_its_powers() -> None:
     """With all powers times q the fold is at q K: here by one power, so that the rotors turn together."""
     scene = sc.Scene(MACHINE, LINE, sc.graphs.ring(5), parameters={"P": POWERS})
