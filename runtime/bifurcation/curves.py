@@ -34,22 +34,21 @@ import numpy as np
 from synchain.models.inputs.checks import check_keys, check_number, check_table, listed
 
 from .arclength import FIRST_STEP, LARGEST_STEP, MOST, Limits, Point, correct, walk
+from .critical_curve import CriticalCurve
 from .cycle_curves import CycleCurve
 from .detection import REAL, BranchStep
 from .equilibrium import Equilibrium
-from .equilibrium_curves import FoldCurve, HopfCurve
+from .equilibrium_curves import EquilibriumCurve
 from .kinds import BifurcationKind
 from .problems import BranchProblem
 from .results import Bifurcation, Curve, CurvePoint, digits_of
-
-CurveProblem = FoldCurve | HopfCurve | CycleCurve
 
 
 def codimension_two(
     problem: BranchProblem, before: Point, after: Point, length: float
 ) -> list[tuple[float, object]] | None:
     """Return the points of codimension two on a step of a curve with their distances; None if it is too long."""
-    if not isinstance(problem, CurveProblem):
+    if not isinstance(problem, CriticalCurve):
         raise TypeError("points of codimension two belong to curves")
     try:
         return sorted(_points(problem, BranchStep(problem, before, after, length)), key=lambda pair: pair[0])
@@ -57,7 +56,7 @@ def codimension_two(
         return None
 
 
-def _points(problem: CurveProblem, step: BranchStep) -> Iterator[tuple[float, CurvePoint]]:
+def _points(problem: CriticalCurve, step: BranchStep) -> Iterator[tuple[float, CurvePoint]]:
     """Yield the points of codimension two, and those at which a parameter is extreme, in any order."""
 
     def point(kind: str, distance: float) -> tuple[float, CurvePoint]:
@@ -149,13 +148,8 @@ def _part(
 ) -> tuple[list[CurveRow], list[CurvePoint], str]:
     """Follow a curve in one direction; return its points, the special ones and how it ends."""
     solution = first.solution
-    problem: CurveProblem
-    if not isinstance(solution, Equilibrium):
-        problem = CycleCurve(first, solution, names, ranges)
-    elif first.kind is BifurcationKind.HOPF:
-        problem = HopfCurve(first, solution, names, ranges)
-    else:
-        problem = FoldCurve(first, solution, names, ranges)
+    rests = isinstance(solution, Equilibrium)
+    problem = (EquilibriumCurve if rests else CycleCurve)(first, solution, names, ranges)  # type: ignore[arg-type]
     along = np.zeros(len(problem.point))
     along[-1] = sign / problem.weights[-1]
     point = correct(problem, problem.point, along)

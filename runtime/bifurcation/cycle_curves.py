@@ -1,7 +1,7 @@
-"""Curves of folds, period doublings and torus points of cycles in two parameters, as problems that `arclength` follows.
+"""Curves of folds, period doublings and torus points of cycles in two parameters.
 
-With y the unknowns of a cycle (states x_1 … x_m of m segments, shifts, period), F(y, q, p) = 0 its equations, K their
-Jacobian and M_i the propagators, the unknowns are z = (y, w, q, p), for torus points (y, a, u, c, q, p):
+With y the unknowns of a cycle (states x_1 … x_m of m segments, shifts, period), K the Jacobian of its equations by y and
+M_i the propagators:
 
 * folds: K w = 0;
 * period doublings: M_i w_i = w_(i+1), M_m w_m = -w_1;
@@ -12,8 +12,6 @@ Jacobian and M_i the propagators, the unknowns are z = (y, w, q, p), for torus p
 
 The derivatives of M_i w_i by states and parameters are exact: (x, w) is a state of the lifted network, and its
 propagators contain them.
-
-Source: Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed. (Springer, 2004), sections 10.2 and 10.3.
 """
 
 from __future__ import annotations
@@ -27,26 +25,23 @@ from scipy import linalg
 from synchain.models.dynamics.lift import lifted
 from synchain.models.dynamics.reduction import without_drive
 
-from .arclength import Point, Test
+from .arclength import Test
+from .critical_curve import CriticalCurve, CriticalEquations
 from .cycles import Cycles
 from .flow import TOLERANCE, Image, flow_of
 from .kinds import BifurcationKind
 from .periodic_result import PeriodicOrbit
-from .problems import GrowthNumbers
 from .results import Bifurcation
 from .transversal import expansion
-
-LARGEST = 2.0
-"""Largest entry of a critical vector, relative to the entry that is 1, before another entry is chosen (a choice)."""
 
 ONE_MODE = 1e-6
 """Largest part of the image of a mode's deviations that leaves the mode, relative to the image (a choice)."""
 
 
-class CycleCurve:
+class CycleCurve(CriticalCurve):
     """Folds, branch points of differences, period doublings or torus points of cycles."""
 
-    kinked = False
+    base: Cycles
 
     def __init__(self, first: Bifurcation, orbit: PeriodicOrbit, names: Sequence[str], ranges: np.ndarray) -> None:
         scene = orbit.scene
@@ -55,10 +50,9 @@ class CycleCurve:
                 "follow: found set-valued friction, stops or resets in two parameters; expected smooth rates; follow the "
                 "cycles in one parameter for some values of the other"
             )
-        self.kind_of_points, self.critical_value, self.multiplicity = first.kind, first.critical, first.multiplicity
-        self.base = base = Cycles.of(orbit, *names)
-        self.names = base.names
+        base = Cycles.of(orbit, *names)
         base.set_ranges(ranges)
+        super().__init__(base, first.kind, first.multiplicity)
         n = base.flow.size
         # Deviations of the equations `network`, whose states are `copies` of those of the quotient, are the columns of
         # `right`: all of them, or differences within clusters.  `left` returns their coordinates, in units of the extents.
@@ -80,61 +74,28 @@ class CycleCurve:
         self.seeds = dict.fromkeys(self.lift.seeds.values(), 0.0)
         first_state = self._both(base.states(base.point)[:1] @ self.copies.T, 0.0)[0]
         self.flow = flow_of(scene, self.lift.equations, self.names, first_state)
-        self.reference: np.ndarray | None = None  # left null vector of the last fold
         start = base.accept(base.point, np.ones(len(base.point)))[0]
-        self.place, self.point = 0, start
-        self._begin(start)
-
-    # --- unknowns ---
-    @property
-    def size(self) -> int:
-        """Number of unknowns of the cycle."""
-        return len(self.base.point) - len(self.names)
+        self.size = len(start) - 2
+        number = first.critical.real / abs(first.critical)
+        self.point = np.insert(start, self.size, self._vectors_at(start, number))
 
     @property
-    def is_fold(self) -> bool:
-        """Whether the critical vector contains a change of the period, as at a fold of cycles."""
-        return self.kind_of_points is BifurcationKind.FOLD
-
-    @property
-    def is_torus(self) -> bool:
-        """Whether a pair of multipliers is critical; the last unknown before the parameters is its cosine."""
-        return self.kind_of_points is BifurcationKind.TORUS
-
-    @property
-    def weights(self) -> np.ndarray:
-        """Lengths are those of cycles; the critical vectors follow from them."""
-        inner = np.zeros(len(self.point) - len(self.base.point))
-        return np.insert(self.base.weights, self.size, inner)
-
-    def cycle(self, z: np.ndarray) -> np.ndarray:
-        """Return the unknowns (y, q, p) of the cycle at a point of the curve."""
-        return np.append(z[: self.size], z[-len(self.names) :])
-
-    def _vectors(self, z: np.ndarray) -> np.ndarray:
-        """Return the critical vectors in units of the extents: w, or (a, u)."""
-        end = len(z) - len(self.names) - self.is_torus
-        return z[self.size : end]
-
-    def _units(self) -> np.ndarray:
-        """Return the units of w: extents of the states, shifts by the largest of them, the period."""
+    def units(self) -> np.ndarray:
+        """The units of w: extents of the states, shifts by the largest of them, the period."""
         base = self.base
         shifts = np.full(base.shifts.shape[1], float(base.scale.max()))
         period = [] if base.periods else [base.point[self.size - 1]]
         return np.concatenate([np.tile(self.scale, base.segments), shifts, period])
 
-    def _begin(self, point: np.ndarray) -> None:
-        """Compute the critical vectors of a cycle, and make it the reference."""
-        base = self.base
+    def _vectors_at(self, point: np.ndarray, number: float) -> np.ndarray:
+        m = self.base.segments
         if self.is_fold:
             inner = np.linalg.svd(self._bordered(point)[0])[2][-1]
         else:
-            image, m = self._image(point, np.zeros((base.segments, len(self.left)))), base.segments
+            image, one = self._image(point, np.zeros((m, len(self.left)))), np.eye(len(self.left))
             propagators = self._own(image)
-            values, vectors = np.linalg.eig(
-                np.linalg.multi_dot([np.eye(len(self.left)), *propagators[::-1], np.eye(len(self.left))])
-            )
-            chosen = int(np.abs(values - self.critical_value).argmin())
+            values, vectors = np.linalg.eig(np.linalg.multi_dot([one, *propagators[::-1], one]))
+            chosen = int(np.abs(values - self.critical_values(number)[0]).argmin())
             if self.multiplicity > 1:
                 moved = image.propagators[0][np.ix_(self.lift.deviations, self.lift.deviations)] @ self.right
                 if np.abs(moved - self.right @ propagators[0]).max() > ONE_MODE * np.abs(moved).max():
@@ -147,12 +108,10 @@ class CycleCurve:
             inner = np.concatenate(parts)
         self.place = int(np.abs(inner).argmax())
         inner = inner / inner[self.place]
-        if self.is_torus:
+        if self.is_pair:
             value = values[chosen] / abs(values[chosen])
-            inner = np.concatenate(
-                [inner.real, abs(value.imag) * inner.imag * math.copysign(1.0, value.imag), [value.real]]
-            )
-        self.point = np.insert(point, self.size, inner.real)
+            return np.concatenate([inner.real, value.imag * inner.imag, [value.real]])
+        return np.asarray(inner.real)
 
     # --- equations ---
     def _both(self, states: np.ndarray, deviations: np.ndarray | float) -> np.ndarray:
@@ -178,7 +137,7 @@ class CycleCurve:
     def _bordered(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return K in units of the extents, and residual and Jacobian of the cycle."""
         residual, matrix = self.base.linearise(point)
-        scaled = matrix[:, : self.size] * self._units()
+        scaled = matrix[:, : self.size] * self.units
         scaled[: self.base.phase.size] /= np.tile(self.scale, self.base.segments)[:, None]
         return scaled, residual, matrix
 
@@ -193,10 +152,8 @@ class CycleCurve:
                     matrix[s, i, :, t, (i + 1) % m] -= share * one
         return matrix.reshape(r * m * k, r * m * k)
 
-    def _parts(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return residual and Jacobian of the cycle, A of the critical vectors w, A_y w and A_c w."""
-        base, (m, n), q = self.base, self.base.phase.shape, len(self.names)
-        point, w = self.cycle(z), self._vectors(z)
+    def _evaluate(self, z: np.ndarray) -> CriticalEquations:
+        base, (m, n), point, w = self.base, self.base.phase.shape, self.solution(z), self.vectors(z)
         rows = w[: m * n].reshape(m, n) if self.is_fold else w.reshape(-1, len(self.left))
         image, values = self._image(point, rows), {**base.values(point), **self.seeds}
         states, deviations = [*self.lift.states], [*self.lift.deviations]
@@ -210,7 +167,7 @@ class CycleCurve:
             matrix, residual, jacobian = self._bordered(point)
             if not base.periods:
                 # A change tau of the period moves the end by f tau/m: the derivatives of f along those of the end.
-                ends, tau = image.states[:, states], w[-1] * self._units()[-1] / m
+                ends, tau = image.states[:, states], w[-1] * self.units[-1] / m
                 rates = self.flow.rates(values, image.states)[:, states]
                 ahead = np.concatenate([image.propagators[:, states][:, :, states], rates[:, :, None] / m], axis=2)
                 for i, end in enumerate(ends):
@@ -226,8 +183,8 @@ class CycleCurve:
             residual, jacobian = base.linearise(point)
             sign = -1.0 if self.kind_of_points is BifurcationKind.PERIOD_DOUBLING else 1.0
             turn, by = np.full((1, 1), sign), np.zeros((1, 1))
-            if self.is_torus:
-                c = z[-3]
+            if self.is_pair:
+                c = self.number(z)
                 turn, by = np.array([[c, -1.0], [1.0 - c * c, c]]), np.array([[1.0, 0.0], [-2.0 * c, 1.0]])
             matrix = self._cyclic(self._own(image)[:m], turn)
             ends = by_cosine.reshape(len(turn), m, -1)
@@ -236,100 +193,57 @@ class CycleCurve:
         for i, (block, time, column) in enumerate(zip(moved, by_time, columns, strict=True)):
             k, s = len(block), i % m
             bent[i * k : i * k + k, s * n : s * n + n] = block
-            bent[i * k : i * k + k, -q:] = column
+            bent[i * k : i * k + k, -2:] = column
             if not base.periods:
                 bent[i * k : i * k + k, self.size - 1] = time
-        return residual, jacobian, matrix, bent, by_cosine
+        return CriticalEquations(residual, jacobian, matrix, bent, by_cosine)
 
-    def linearise(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residual and its derivatives."""
-        residual, jacobian, matrix, bent, by_cosine = self._parts(z)
-        size, w, q = self.size, self._vectors(z), len(self.names)
-        ones = [self.place, self.place + len(w) // 2] if self.is_torus else [self.place]
-        unit = np.zeros((len(ones), len(w)))
-        unit[range(len(ones)), ones] = 1.0
-        full = np.zeros((size + len(w) + len(ones), len(z)))
-        full[:size, :size], full[:size, -q:] = jacobian[:, :size], jacobian[:, -q:]
-        full[size : size + len(w), :size], full[size : size + len(w), -q:] = bent[:, :size], bent[:, -q:]
-        full[size:, size : size + len(w)] = np.vstack([matrix, unit])
-        if self.is_torus:
-            full[size : size + len(w), -q - 1] = by_cosine
-        return np.concatenate([residual, matrix @ w, w[ones] - [1.0, 0.0][: len(ones)]]), full
+    def _errors(self, z: np.ndarray) -> np.ndarray:
+        w = self.vectors(z)
+        return np.full(len(w) + 1 + self.is_pair, TOLERANCE * max(1.0, float(np.abs(w).max())))
 
-    def noise(self, z: np.ndarray) -> np.ndarray:
-        """Return what the integration leaves: its tolerance times the sizes of the terms."""
-        w, largest = self._vectors(z), max(1.0, float(np.abs(self._vectors(z)).max()))
-        sizes = np.full(len(w) + 1 + self.is_torus, TOLERANCE * largest)
-        return np.append(self.base.noise(self.cycle(z)), sizes)
-
-    def accept(self, z: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Make a solution the reference; compute the vectors anew if segments are divided or the fixed entry is small."""
-        size, q, segments = self.size, len(self.names), self.base.segments
-        inner, moved = z[size:-q], tangent[size:-q]
-        point, ahead = self.base.accept(self.cycle(z), self.cycle(tangent))
-        self.point = np.insert(point, self.size, inner)
-        if self.base.segments != segments or float(np.abs(self._vectors(z)).max()) > LARGEST:
-            if self.is_torus:
-                self.critical_value = complex(z[-3], math.sqrt(max(0.0, 1.0 - z[-3] ** 2)))
-            self._begin(point)
-            moved = np.zeros(len(self.point) - len(point))
-        tangent = np.insert(ahead, self.size, moved)
-        if self.is_fold and not self.of_differences:
-            self.reference = self._null(self._bordered(point)[0])
-        return self.point, tangent / float(np.linalg.norm(self.weights * tangent))
-
-    # --- what happens along the curve ---
-    def critical(self, z: np.ndarray) -> GrowthNumbers:
-        """Return the multipliers but the critical ones."""
-        values: list[complex] = [-1.0 if self.kind_of_points is BifurcationKind.PERIOD_DOUBLING else 1.0]
-        if self.is_torus:
-            root = complex(np.emath.sqrt(1.0 - z[-3] ** 2))
-            values = [z[-3] + 1j * root, z[-3] - 1j * root]
-        return self.base.critical(self.cycle(z)).without(values * self.multiplicity)
-
-    def kind(self, value: complex, turned: bool) -> BifurcationKind:
-        """Return the kind of all points of the curve."""
-        return self.kind_of_points
-
-    def _null(self, matrix: np.ndarray) -> np.ndarray:
-        """Return the left null vector, in the direction of that of the last point."""
-        u = np.linalg.svd(matrix)[0][:, -1]
-        return u if self.reference is None or len(self.reference) != len(u) or u @ self.reference > 0.0 else -u
+    def critical_values(self, number: float) -> list[complex]:
+        """Return 1, -1, or the pair with a cosine on the unit circle; beyond it that of a neutral saddle."""
+        root = 1j * complex(np.emath.sqrt(1.0 - number**2))
+        if self.is_pair:
+            return [number + root, number - root]
+        return [-1.0 if self.kind_of_points is BifurcationKind.PERIOD_DOUBLING else 1.0]
 
     def tests(self) -> Mapping[str, Test]:
         """Return the test functions of points of codimension two."""
-
-        def cusp(point: Point) -> float:
-            _, _, matrix, bent, _ = self._parts(point.z)
-            vector = self._units() * self._vectors(point.z)
-            return float(self._null(matrix) @ (bent[:, : self.size] @ vector))
-
-        if self.is_torus:
-            return {"1:3 resonance": lambda point: point.z[-3] + 0.5, "1:4 resonance": lambda point: point.z[-3]}
-        return {"cusp": cusp} if self.is_fold else {}
+        if self.is_pair:
+            return {
+                "1:3 resonance": lambda point: self.number(point.z) + 0.5,
+                "1:4 resonance": lambda point: self.number(point.z),
+            }
+        return {"cusp": self.cusp} if self.is_fold else {}
 
     def limits(self) -> Mapping[str, Test]:
         """Return functions that are positive on the curve; it ends where one is zero."""
-        if not self.is_torus:
+        if not self.is_pair:
             return {}
-        return {"1:1 resonance": lambda point: 1.0 - point.z[-3], "1:2 resonance": lambda point: 1.0 + point.z[-3]}
+        return {
+            "1:1 resonance": lambda point: 1.0 - self.number(point.z),
+            "1:2 resonance": lambda point: 1.0 + self.number(point.z),
+        }
 
     def passing(self, value: complex) -> str:
         """Name the point at which another multiplier passes; real if its imaginary part is zero."""
         other = self.base.kind(value, turned=True)
-        if other is self.kind_of_points and not self.of_differences and not self.is_torus:
+        if other is self.kind_of_points and not self.of_differences and not self.is_pair:
             return "1:1 resonance" if self.is_fold else "1:2 resonance"
         return f"{self.kind_of_points} with {other}"
 
     def frequency(self, z: np.ndarray) -> float:
         """Return the angular frequency of the second oscillation at a torus point, 0 elsewhere."""
-        return math.acos(min(1.0, max(-1.0, z[-3]))) / self.period(z) if self.is_torus else 0.0
+        return math.acos(min(1.0, max(-1.0, self.number(z)))) / self.period(z) if self.is_pair else 0.0
 
     def period(self, z: np.ndarray) -> float:
         """Return the period of the cycle."""
-        return self.base.period(self.cycle(z))
+        return self.base.period(self.solution(z))
 
     def state(self, z: np.ndarray) -> np.ndarray:
         """Return the state of the network at the beginning of a period."""
         base = self.base
-        return np.asarray(expansion(base.scene.equations, base.classes, base.flow.size) @ base.states(self.cycle(z))[0])
+        states = base.states(self.solution(z))
+        return np.asarray(expansion(base.scene.equations, base.classes, base.flow.size) @ states[0])
