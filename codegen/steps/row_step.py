@@ -238,8 +238,7 @@ class _WrittenOut(_Writer):
         equations, groups, first = self.equations, list[_Group](), 0
         for part in equations.parts:
             template = part.template
-            rates = equations.rates_of(part)
-            groups.append(_Group(first, template.rows, part.at, rates, template.state, part.places))
+            groups.append(_Group(first, template.rows, part.at, part.rates, template.state, part.places))
             first += len(template.rows)
         for i in () if equations.joined else by_kind(equations):
             rows, size = equations.rows_at(i), len(equations.node_at(i).continuous)

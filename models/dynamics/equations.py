@@ -25,7 +25,7 @@ from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Block, Edge, Node
 from ..mechanics.events import Event
 from ..mechanics.rows import Law, Row
-from .parts import Part, PartLink, local, of_link, part_template
+from .parts import MOST_JOINED_NODES, Cached, Member, Part, PartLink, parts_of
 
 Ends = tuple[int, int]
 """The kinds of a link's target and source."""
@@ -40,14 +40,6 @@ DIGEST_LIMIT = 10_000
 
 Up to this number a complete graph and a list of the same links have equal digests.
 """
-
-
-MOST_JOINED_NODES = 16
-"""Most nodes of a network with rows in links (a choice): its steps are written out, and longer ones compile slowly."""
-
-
-class _Cached:
-    """Give a dataclass with slots a dictionary for cached properties; pickles omit this dictionary."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +79,7 @@ class Layer:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Equations(_Cached, HasLatex):
+class Equations(Cached, HasLatex):
     """The equations of motion of a network, M d(state)/dt = rhs.
 
     M is the identity unless nodes or links have inertia.  The state is ordered by components: x_1 … x_n, v_1 … v_n.
@@ -326,6 +318,11 @@ class Equations(_Cached, HasLatex):
         return sum(len(self.nodes[k].state) for k in self.kind_of)
 
     @cached_property
+    def continuous_dimension(self) -> int:
+        """Number of continuous state variables, which are all but the modes of events."""
+        return sum(len(self.nodes[k].continuous) for k in self.kind_of)
+
+    @cached_property
     def parameters(self) -> tuple[str, ...]:
         """Names of all parameters, nodes first.
 
@@ -447,53 +444,18 @@ class Equations(_Cached, HasLatex):
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:
-        """The parts of a network with rows in links (`synchain.models.dynamics.parts`), in the order of their first nodes."""
+        """The parts of a network with rows in links, in the order of their first nodes."""
         if not self.joined:
             return ()
-        part_of = list(range(self.n))
-        links = [(layer, link, modes) for layer in self.layers for link, modes in layer.held]
-        for _, (i, j, _), _ in links:
-            merged = part_of[j]
-            part_of = [part_of[i] if k == merged else k for k in part_of]
-        parts = []
-        for number in dict.fromkeys(part_of):
-            nodes = tuple(i for i in range(self.n) if part_of[i] == number)
-            inside = [each for each in links if each[1][0] in nodes]
-            at: dict[sp.Symbol, sp.Symbol] = {}
-            for m, i in enumerate(nodes):
-                at |= {local(s, m): e for s, e in self.at_node(i).items()}
-            shape = []
-            for k, (layer, link, modes) in enumerate(inside):
-                target, source, weight = link
-                edge = dict(layer.edge_of)[self.ends(link)]
-                shape.append(PartLink(edge, nodes.index(target), nodes.index(source), weight, modes, layer.varied))
-                names = (layer.name(name, link) for name in layer.varied)
-                at |= {
-                    of_link(name, k): sp.Symbol(own, real=True) for name, own in zip(layer.varied, names, strict=True)
-                }
-            template = part_template(tuple(map(self.node_at, nodes)), tuple(shape), self.varied)
-            if template.rows:
-                places = (k for i in nodes for k in self.places[i][: len(self.node_at(i).continuous)])
-                parts.append(Part(nodes, template, at, tuple(places)))
-        return tuple(parts)
-
-    def rows_of(self, part: Part) -> tuple[Row, ...]:
-        """Return the rows of a part in the symbols of the network."""
-        values: dict[sp.Symbol, sp.Expr] = {**part.at, **self.rates_of(part)}
-        return tuple(row.map(lambda e: e.xreplace(values)) for row in part.template.rows)
-
-    def rates_of(self, part: Part) -> dict[sp.Symbol, sp.Expr]:
-        """Return the rate without rows for each symbol of a rate in the template of a part."""
-        pairs = zip(part.template.rates, part.places, strict=True)
-        return {s: self._plain_rhs[k] for s, k in pairs if s is not None}
-
-    def added_rates(self) -> Iterator[tuple[int, sp.Expr]]:
-        """Yield (row, rate) for each rate that the rows of a part add."""
-        for part in self.parts:
-            values: dict[sp.Symbol, sp.Expr] = {**part.at, **self.rates_of(part)}
-            yield from (
-                (k, e.xreplace(values)) for k, e in zip(part.places, part.template.added, strict=True) if e != 0
-            )
+        sizes = [len(self.node_at(i).continuous) for i in range(self.n)]
+        members = [Member(self.node_at(i), self.at_node(i), self.places[i][:size]) for i, size in enumerate(sizes)]
+        links = []
+        for layer in self.layers:
+            templates = dict(layer.edge_of)
+            for link, modes in layer.held:
+                symbols = {name: sp.Symbol(layer.name(name, link), real=True) for name in layer.varied}
+                links.append((PartLink(templates[self.ends(link)], *link, modes, layer.varied), symbols))
+        return parts_of(members, links, self._plain_rhs, self.varied)
 
     @cached_property
     def _plain_rhs(self) -> list[sp.Expr]:
@@ -508,9 +470,13 @@ class Equations(_Cached, HasLatex):
     def rhs(self) -> tuple[sp.Expr, ...]:
         """Return the right-hand side in state order; meant for small n, since the algebra grows with n."""
         rates = [*self._plain_rhs]
-        for k, e in self.added_rates():
+        for k, e in self._added_rates():
             rates[k] += e
         return tuple(rates)
+
+    def _added_rates(self) -> Iterator[tuple[int, sp.Expr]]:
+        """Yield (row, rate) for each rate that the rows of a part add."""
+        return ((k, e) for part in self.parts for k, e in zip(part.places, part.added, strict=True) if e != 0)
 
     def _of_nodes(self, by_kind: list[tuple[sp.Expr, ...]]) -> list[sp.Expr]:
         """Return expressions for each state of a kind of node in state order, in the symbols of the network."""
@@ -559,7 +525,7 @@ class Equations(_Cached, HasLatex):
             for k in link[3:]:
                 yield from _block(beyond, places[link[0]], places[k], values)
         states = {sp.Symbol(name, real=True): k for k, name in enumerate(self.state)}
-        for row, e in self.added_rates():
+        for row, e in self._added_rates():
             moving = sorted(e.free_symbols & set(states), key=states.__getitem__)
             yield from (((row, states[s]), derivative(e, s)) for s in moving)
 
@@ -577,7 +543,7 @@ class Equations(_Cached, HasLatex):
             for k, e in zip(self.places[link[0]], slopes.get(edge, ()), strict=False):
                 if e != 0:
                     yield k, e.xreplace(self.at_link(link, edge))
-        yield from ((k, derivative(e, TIME)) for k, e in self.added_rates() if e.has(TIME))
+        yield from ((k, derivative(e, TIME)) for k, e in self._added_rates() if e.has(TIME))
 
     @cached_property
     def digest(self) -> str:
@@ -655,10 +621,8 @@ def check(eq: Equations) -> None:
         raise ValueError(f"kinds of nodes: found {len(eq.nodes)} templates and the kinds {sorted(set(eq.kind_of))}")
     if eq.sticks:
         _check_friction(eq)
-    if eq.joined:
-        _check_joined(eq)
     _check_links(eq)
-    _check_stops(eq)
+    _check_gaps(eq)
     _check_numbered(eq)
 
     # Each name has one meaning.
@@ -688,36 +652,33 @@ def _check_friction(eq: Equations) -> None:
         )
 
 
-def _check_stops(eq: Equations) -> None:
-    """Raise ValueError for links that change the rate of a coordinate in the gap of a stop.
-
-    The impact reverses the speed of the gap by the velocities of the node alone.
-    """
-    for (target, _), edge in (pair for layer in eq.layers for pair in layer.edge_of):
-        node = eq.nodes[target]
-        moved = {s for s, e in zip(node.state, edge.rhs, strict=False) if e != 0}
-        for row in node.rows:
-            if row.law is Law.STOP and (both := row.level.free_symbols & moved):
-                name = min(s.name for s in both)
-                raise ValueError(
-                    f"stops: found a link that changes the rate of {name}, which is in the gap {row.level}; expected forces, "
-                    "which change velocities"
-                )
-
-
-def _check_joined(eq: Equations) -> None:
-    """Raise ValueError for networks in which rows in links are not supported."""
-    if eq.n > MOST_JOINED_NODES:
+def _check_gaps(eq: Equations) -> None:
+    """Raise ValueError for links that change the rate of a coordinate in the level of a row: rows move it by its velocity."""
+    if eq.joined and eq.n > MOST_JOINED_NODES:
         raise ValueError(
             f"rows in links: found {eq.n} nodes; expected at most {MOST_JOINED_NODES}, whose steps are written out"
         )
-    for (target, _), edge in eq.edge_of:
+    pairs = [pair for layer in eq.layers for pair in layer.edge_of]
+    # the levels that hold coordinates, by the kind of the node, in the symbols of the node
+    levels = [
+        [row.level for row in node.rows if row.law is Law.STOP]
+        + [s.level for s in node.surfaces if s.law is not Law.RESET]
+        for node in eq.nodes
+    ]
+    for kinds, edge in pairs:
+        for kind, states in zip(kinds, edge.end_states, strict=False):
+            swap = dict(zip(states, eq.nodes[kind].state, strict=True))
+            levels[kind] += [surface.level.xreplace(swap) for surface in edge.surfaces]
+    for (target, _), edge in pairs:
         node = eq.nodes[target]
-        half = len(node.continuous) // 2
-        if has_velocities(node) and any(e != 0 for e in edge.rhs[:half]):
-            raise ValueError(
-                f"rows in links: found a link that changes the rate of {node.state[0]}; expected forces, which change velocities"
-            )
+        coordinates = node.state[: len(node.continuous) // 2] if has_velocities(node) else ()
+        moved = {s for s, e in zip(coordinates, edge.rhs, strict=False) if e != 0}
+        for level in levels[target]:
+            if both := level.free_symbols & moved:
+                raise ValueError(
+                    f"events: found a link that changes the rate of {min(s.name for s in both)}, which is in {level}; "
+                    "expected forces, which change velocities"
+                )
 
 
 def _check_links(eq: Equations) -> None:

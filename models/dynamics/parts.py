@@ -9,9 +9,9 @@ one shape therefore have the same code, and equal bits in equal states.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import sympy as sp
 
@@ -19,10 +19,22 @@ from ..interactions.ends import has_velocities
 from ..mechanics.components import Edge, Node
 from ..mechanics.rows import MOST_JOINED, Law, Row, Surface, added_rates, rows_of
 
+MOST_JOINED_NODES = 16
+"""Most nodes of a network with rows in links (a choice): its steps are written out, and longer ones compile slowly."""
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A node of a network, with the symbols and places that the network has for its own."""
+
+    node: Node
+    at: Mapping[sp.Symbol, sp.Symbol]  # for each state and each parameter that differs from node to node
+    places: tuple[int, ...]  # of its continuous states
+
 
 @dataclass(frozen=True, slots=True)
 class PartLink:
-    """A link with rows; its ends are places in the part, from 0."""
+    """A link with rows; its ends are places in the part, or in the network, from 0."""
 
     edge: Edge
     target: int
@@ -43,19 +55,69 @@ class PartTemplate:
     owners: tuple[tuple[int, int], ...]  # for each row the node, and its number among the rows of this node
 
 
+class Cached:
+    """Give a dataclass with slots a dictionary for cached properties; pickles omit this dictionary."""
+
+
 @dataclass(frozen=True, slots=True)
-class Part:
+class Part(Cached):
     """A part of a network: its nodes, and the symbols and states of the network for its template."""
 
     nodes: tuple[int, ...]
     template: PartTemplate
     at: Mapping[sp.Symbol, sp.Symbol]  # for each state and parameter of the template the symbol of the network
     places: tuple[int, ...]  # for each state of the template its index in the state of the network
+    rates: Mapping[sp.Symbol, sp.Expr]  # for each symbol of a rate in the template the rate without rows
 
     @property
     def owners(self) -> list[tuple[int, int]]:
         """The node of the network, and the number in the node, of each row."""
         return [(self.nodes[m], a) for m, a in self.template.owners]
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """The rows in the symbols of the network."""
+        return tuple(row.map(self._placed) for row in self.template.rows)
+
+    @cached_property
+    def added(self) -> tuple[sp.Expr, ...]:
+        """What the rows add to the rate of each state, in the symbols of the network."""
+        return tuple(map(self._placed, self.template.added))
+
+    def _placed(self, e: sp.Expr) -> sp.Expr:
+        return e.xreplace({**self.at, **self.rates})
+
+
+def parts_of(
+    members: Sequence[Member],
+    links: Sequence[tuple[PartLink, Mapping[str, sp.Symbol]]],
+    rates: Sequence[sp.Expr],
+    varied: tuple[str, ...],
+) -> tuple[Part, ...]:
+    """Return the parts of a network with rows in links, in the order of their first nodes.
+
+    `links`: links between `members`, with the symbol of each numbered parameter; `rates`: without rows, in state order.
+    """
+    part_of = list(range(len(members)))
+    for link, _ in links:
+        merged = part_of[link.source]
+        part_of = [part_of[link.target] if k == merged else k for k in part_of]
+    parts = []
+    for number in dict.fromkeys(part_of):
+        nodes = tuple(i for i in range(len(members)) if part_of[i] == number)
+        at: dict[sp.Symbol, sp.Symbol] = {}
+        for m, i in enumerate(nodes):
+            at |= {local(s, m): e for s, e in members[i].at.items()}
+        shape = list[PartLink]()
+        for link, symbols in (each for each in links if each[0].target in nodes):
+            at |= {of_link(name, len(shape)): s for name, s in symbols.items()}
+            shape.append(replace(link, target=nodes.index(link.target), source=nodes.index(link.source)))
+        template = part_template(tuple(members[i].node for i in nodes), tuple(shape), varied)
+        if template.rows:
+            places = tuple(k for i in nodes for k in members[i].places)
+            plain = {s: rates[k] for s, k in zip(template.rates, places, strict=True) if s is not None}
+            parts.append(Part(nodes, template, at, places, plain))
+    return tuple(parts)
 
 
 def local(s: sp.Symbol, m: int) -> sp.Symbol:

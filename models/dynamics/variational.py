@@ -192,7 +192,7 @@ def network_variation(equations: Equations, names: Sequence[str] = ()) -> Variat
             "runs instead"
         )
     equations.expect_alike("variational equation of the whole network", varied_too=True, layers_too=True)
-    size = equations.n * len(equations.node.continuous)
+    size = equations.continuous_dimension
     entries = {key: e for key, e in equations.jacobian().items() if max(key) < size}
     grounds = [event.target for i in range(equations.n) for event in equations.events_at(i)] if names else []
     for column, name in enumerate(names, size):

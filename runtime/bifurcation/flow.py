@@ -88,7 +88,7 @@ def flow_of(scene: Scene, equations: Equations, names: Sequence[str], state: np.
     """
     present = tuple(name for name in names if name in equations.parameters)
     if equations.sticks:
-        return ContactFlow(scene, equations, present, tuple(names), equations.n * len(equations.node.continuous))
+        return ContactFlow(scene, equations, present, tuple(names), equations.continuous_dimension)
     lift, job = _job(scene.replace(rtol=TOLERANCE, atol=None), equations, present, tuple(map(float, state)))
     return LiftedFlow(equations, lift, job, present, tuple(names), equations.dimension, _linearised(equations))
 

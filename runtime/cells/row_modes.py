@@ -118,7 +118,7 @@ def _modes_of_parts(equations: Equations, states: np.ndarray, values: Values, sl
     states[:, modes] = 1.0
     columns = {s: c[:, 0] for s, c in values.items()}
     for part in equations.parts:
-        rows, undecided = equations.rows_of(part), dict[int, list[int]]()
+        rows, undecided = part.rows, dict[int, list[int]]()
         for a, row in enumerate(rows):
             at = columns | {s: states[:, k] for k, s in enumerate(symbols)}
             level, speed = (_at(e, at, (len(states),)) for e in (row.level, row.speed))

@@ -96,7 +96,7 @@ def returns(
 
 def _free(problem: OrbitProblem, start: np.ndarray) -> np.ndarray:
     """Return the first state of an orbit (p,) that no contact, stop or surface holds; `start` if there is none."""
-    integrator, size, state = _integrator(problem, start), problem.continuous, start
+    integrator, size, state = _integrator(problem, start), problem.variation.orbit.continuous_dimension, start
     for _ in range(FREE):
         if np.all(state[size:] != 0.0):
             return state
@@ -138,7 +138,10 @@ def _passage(
 
 def _newton(problem: OrbitProblem, start: np.ndarray, time: float, extent: np.ndarray, closed: float) -> Cycle | None:
     """Return the cycle near a state, with a period near `time`; None if Newton's method leaves the neighbourhood."""
-    p, rates = problem.continuous, problem.rates  # the modes of contacts follow from the p continuous states
+    p, rates = (
+        problem.variation.orbit.continuous_dimension,
+        problem.rates,
+    )  # the modes of contacts follow from the p continuous states
     state, period, near, scale = start, time, NEAR * extent[:p], _scale(extent[:p])
     for steps in range(MOST_STEPS):
         try:

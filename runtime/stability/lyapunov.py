@@ -238,7 +238,7 @@ def lyapunov_spectrum(
     scene = given.scene(scene, rtol=scene.rtol if rtol is None else rtol)
     reporter = averaging.reporter()
     equations = scene.equations
-    dimension = sum(len(equations.nodes[kind].continuous) for kind in equations.kind_of)
+    dimension = equations.continuous_dimension
     if count is not None and not 1 <= check_integer("count", count, -dimension) <= dimension:
         raise ValueError(f"count = {count}; expected 1 … {dimension}, the components of the network's state")
     frame = TangentFrame.make(scene, dimension if count is None else count, averaging.seed)

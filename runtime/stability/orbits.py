@@ -146,12 +146,6 @@ class OrbitProblem:
         return self.variation.size // (2 if np.iscomplexobj(self.strengths) else 1)
 
     @property
-    def continuous(self) -> int:
-        """State variables of the orbit, without the modes of events."""
-        orbit = self.variation.orbit
-        return sum(len(orbit.nodes[kind].continuous) for kind in orbit.kind_of)
-
-    @property
     def parameter_values(self) -> np.ndarray:
         """Values (parameters,) of the parameters of the orbit."""
         return _parameter_values(self.scene, self.variation.orbit)

@@ -91,7 +91,7 @@ class TangentFrame:
     def make(cls, scene: Scene, count: int, seed: int) -> TangentFrame:
         """Return a frame at the scene's start, with random directions."""
         equations = without_drive(scene.equations, scene.parameters)
-        size = sum(len(equations.nodes[kind].continuous) for kind in equations.kind_of)
+        size = equations.continuous_dimension
         basis = np.linalg.qr(np.random.default_rng(seed).normal(size=(size, count)))[0]
         alike = len(equations.nodes) == 1 and not equations.inertial
         # lifted networks are faster above LARGEST_UNROLLED nodes, but have no saltation

@@ -37,7 +37,7 @@ WEAK = sc.friction_law("a*sign(w)/(1 + abs(w))", {"a": 0.4, "b": 0.3}, static="b
 REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "a link that moves the coordinate of a gap": (
         lambda: scene(BOUNCE, "x->x").equations,
-        "stops: found a link that changes the rate of x, which is in the gap x; expected forces, which change velocities",
+        "events: found a link that changes the rate of x, which is in x; expected forces, which change velocities",
     ),
     "a product of signs": (
         lambda: sc.Field({x: -sp.sign(x) * sp.sign(y), y: -2 * sp.sign(y) - sp.sign(x)}, contact="set-valued"),

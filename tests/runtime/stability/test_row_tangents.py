@@ -164,7 +164,7 @@ def test_links_that_a_sliding_node_balances() -> None:
     ("coupling", "words"),
     [
         ("damper", r"found links of v, which events change at once.*; expected links of states that no"),
-        ("v->x", "found a link that changes the rate of x, which is in the gap 3/5 - x; expected forces"),
+        ("v->x", "found a link that changes the rate of x, which is in 3/5 - x; expected forces"),
     ],
 )
 def test_links_of_states_that_an_impact_changes_are_refused(coupling: str, words: str) -> None:

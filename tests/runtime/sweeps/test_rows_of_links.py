@@ -114,6 +114,20 @@ def test_a_cradle_of_three(integrator: str) -> None:
     assert result.end.sel(component="v").values == pytest.approx([0.047625, 0.049875, 0.9025], abs=1e-10)
 
 
+def test_links_that_move_blocks_that_rub() -> None:
+    """x' = v + sigma (x_j - x_i) beside a contact: blocks with v = 1, -1 lock at 1/4, then their distance decays."""
+    pair = sc.graphs.chain(2)
+    rates, start = sc.Rates({"x": "k*W*(x_j - x_i)"}, {"k": 0.5}), {"x": [0.0, 0.0], "v": [1.0, -1.0]}
+    settings = {"transient": 0, "window": 1.0, "time_unit": "time", "rtol": 1e-12, "atol": 1e-13, "record": ()}
+    last = end(sc.Scene(BLOCK, links=[(RUB, pair), (rates, pair)], initial=start, integrator="dop853", **settings))
+    at_lock = 10 - 10 * np.exp(-0.25) - 8 * 0.25  # of d' = 2 - 8 t - d, d(0) = 0
+    assert last["x"][0] - last["x"][1] == pytest.approx(at_lock * np.exp(-0.75), abs=1e-11)
+    assert list(last["v"]) == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert list(last["slip_link"])[1] == 0.0
+    with pytest.raises(ValueError, match="found a link that changes the rate of x, which is in"):
+        _ = sc.Scene(BLOCK, links=[(CRADLE, pair), (rates, pair)], initial=start, **settings).equations
+
+
 @pytest.mark.parametrize("integrator", METHODS)
 def test_equal_pairs_have_equal_bits_and_lanes_too(integrator: str) -> None:
     """Five pairs of balls in springs hit at once, each as the first; eight cells in lanes end as each by itself."""
