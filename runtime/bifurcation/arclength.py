@@ -72,6 +72,7 @@ class Point:
     corrections: int
     critical: GrowthNumbers | None = None
     length: float = 0.0  # arclength from the first solution
+    crossing: np.ndarray | None = None  # tangent of the branch that is left here
 
     @property
     def value(self) -> float:
@@ -182,6 +183,9 @@ def walk(problem: BranchProblem, first: Point, limits: Limits, events: Events) -
             yield f"lost at {problem.names[-1]} = {before.value:.8g}"
             return
         after, located, length, end = found
+        if after is before:
+            yield end
+            return
         # Solutions at requested values and bifurcations in the order of their distance.
         extra = [(h, point) for h, point in _at_values(problem, before, after, length, limits)]
         for _, each in sorted([*located, *extra], key=lambda pair: pair[0]):
@@ -205,12 +209,14 @@ def _advance(
         after = correct(problem, before.z + step * before.tangent, before.tangent)
         length, end = step, ""
         weights = problem.weights
-        # A branch leaves a bifurcation in a direction of which the vector there is a part.
-        straight = after is None or _fits(weights, before, after, step) or (problem.kinked and step < KINK)
-        if after is not None and (straight or before.critical is None):
+        if after is not None and (_fits(weights, before, after, step) or (problem.kinked and step < KINK)):
             passed = _passed(after.z, limits.bounds)
             if passed is not None:  # end on the bound
                 place, bound = passed
+                if (
+                    bound == before.z[place] and before.critical is None
+                ):  # it leaves a bifurcation on this bound outwards
+                    return before, [], 0.0, f"{problem.names[place]} = {bound:.8g}"
                 share = (bound - before.z[place]) / (after.z[place] - before.z[place])
                 guess = before.z + share * (after.z - before.z)
                 guess[place] = bound
@@ -236,9 +242,13 @@ def _advance(
 
 def _fits(weights: np.ndarray, before: Point, after: Point, step: float) -> bool:
     """Return whether two solutions lie on one smooth branch: the step bends as its tangents turn."""
-    cosine = float((weights * after.tangent) @ (weights * before.tangent))
+    cosine, moved = float((weights * after.tangent) @ (weights * before.tangent)), weights * (after.z - before.z)
     # On an arc of a circle the correction is the step times the tangent of half the angle.
-    aside = float(np.linalg.norm(weights * (after.z - before.z - step * before.tangent))) / step
+    aside = float(np.linalg.norm(moved - step * weights * before.tangent)) / step
+    if before.crossing is not None:
+        other = weights * before.crossing
+        if np.linalg.norm(moved - (moved @ other) * other) < aside * step:
+            return False
     return cosine > ANGLE and aside < math.tan(math.acos(min(1.0, cosine))) + ASIDE
 
 

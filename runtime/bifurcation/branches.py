@@ -13,24 +13,26 @@ from numbers import Real
 from typing import Literal, overload
 
 import numpy as np
+from scipy.optimize import newton
 
 from synchain.models.inputs.checks import check_number, listed, short_repr, typed_repr
 from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.names import expect_free
 from synchain.models.scenes.scene import Scene
 
-from .arclength import FIRST_STEP, LARGEST_STEP, MOST, Limits, Point, correct, walk
+from .arclength import FIRST_STEP, LARGEST_STEP, MOST, Limits, Point, at_value, correct, walk
 from .corners import Corner, Corners, cycle_bifurcations
 from .curves import follow_curve
 from .cycles import Cycles
-from .detection import Located, bifurcations
+from .detection import TOGETHER, Located, bifurcations, critical_of
 from .equilibria import Equilibria
-from .equilibrium import Equilibrium, resting_equations
+from .equilibrium import Equilibrium, equilibrium
 from .kinds import BifurcationKind
 from .normal_forms import first_lyapunov_coefficient
 from .periodic_result import PeriodicOrbit
 from .results import NAMES, Bifurcation, Branch, Curve, Diagram, diagram, digits_of
-from .switching import directions
+from .switching import directions, leave
+from .transversal import expansion
 
 Direction = Literal["both", "up", "down"]
 
@@ -45,6 +47,10 @@ SAME_GRAZE = 1e-5
 
 BORN = (BifurcationKind.HOPF, BifurcationKind.PERIOD_DOUBLING)
 """Where cycles are born."""
+
+FIRST_SHIFT, SAME_VALUE = 1e-4, 0.1
+"""Second value of the secant method that locates where cycles are born, relative to the range of the parameter, and
+largest distance of the critical value there from that of the cycle, relative to its modulus (choices)."""
 
 LEFT = (BifurcationKind.BRANCH_POINT, BifurcationKind.FOLD)
 """Where a branch leaves to both sides."""
@@ -189,8 +195,7 @@ def follow(
         return follow_curve(first, name, within, SIGNS[direction], largest_step)
     if isinstance(within, Mapping):
         raise ValueError("within: found bounds by names; expected (low, high) for one parameter")
-    solution = first.solution if isinstance(first, Bifurcation) else first
-    scene = solution.scene
+    scene = (first.solution if isinstance(first, Bifurcation) else first).scene
     _check_name(scene, name)
     bounds, requested = _bounds(scene, name, to, values, within)
     begin = scene.parameters[name]
@@ -202,58 +207,40 @@ def follow(
     largest = LARGEST_STEP if largest_step is None else check_number("largest_step", largest_step, 0.0) / size
     limits = Limits((bounds,), MOST, min(FIRST_STEP, largest), largest, requested)
     if longest_period is not None:
-        is_cycle = isinstance(solution, PeriodicOrbit) and solution.free > 0.0
-        if not is_cycle and not (isinstance(first, Bifurcation) and first.kind is BifurcationKind.HOPF):
-            raise ValueError("longest_period: found solutions without a period of their own; expected undriven cycles")
-        longest = check_number(
-            "longest_period", longest_period, solution.free if isinstance(solution, PeriodicOrbit) else 0.0
-        )
-        limits = replace(limits, bounds=((0.0, longest), bounds))
+        limits = replace(limits, bounds=((0.0, _longest_period(first, longest_period)), bounds))
+    if isinstance(first, Bifurcation) and first.kind in (*BORN, *LEFT):
+        # The cycles that are born go to one side; the other is the same cycles, shifted in time.
+        sides = SIGNS["up" if first.kind in BORN else "both"]
+        parts = [_trace(*_leave(first, name, sign, vector, size), limits) for sign in sides]
+        if all(len(points) == 1 for points, *_ in parts):
+            raise _no_branch(first, name, bounds, parts)
+        return _joined(name, parts)
     if to is not None:
         direction = "up" if to > begin else "down"
     signs = SIGNS[direction]
     if len(signs) == 2:  # a first solution on a bound is followed inwards
         signs = tuple(sign for sign, bound in zip(signs, bounds, strict=True) if begin != bound) or signs
-    if isinstance(first, Bifurcation) and first.kind in BORN:
-        # The cycles that are born there go to one side; the other is the same cycles, shifted in time.
-        signs = (1.0,)
-    elif isinstance(first, Bifurcation) and first.kind in LEFT:
-        signs = (-1.0, 1.0)
-    parts = [_trace(*_begin(first, name, sign, vector, size), limits) for sign in signs]
-    return _joined(name, parts)
+    return _joined(name, [_trace(*_begin(first, name, sign, size), limits) for sign in signs])
+
+
+def _longest_period(first: Equilibrium | PeriodicOrbit | Bifurcation, longest: float) -> float:
+    """Check the period at which a branch ends."""
+    solution = first.solution if isinstance(first, Bifurcation) else first
+    shortest = solution.free if isinstance(solution, PeriodicOrbit) else 0.0
+    if not shortest and not (isinstance(first, Bifurcation) and first.kind is BifurcationKind.HOPF):
+        raise ValueError("longest_period: found solutions without a period of their own; expected undriven cycles")
+    return check_number("longest_period", longest, shortest)
 
 
 def _begin(
-    first: Equilibrium | PeriodicOrbit | Bifurcation, name: str, sign: float, vector: int, size: float
+    first: Equilibrium | PeriodicOrbit | Bifurcation, name: str, sign: float, size: float
 ) -> tuple[Equilibria | Cycles, Point]:
-    """Return the problem of a branch and its first point, without critical values where it leaves a bifurcation."""
-    leaves = isinstance(first, Bifurcation) and first.kind in {*BORN, *LEFT}
-    if isinstance(first, Bifurcation) and leaves and not 0 <= vector < len(first.vectors):
-        raise ValueError(f"vector: found {vector}; expected a number below {len(first.vectors)}")
-    problem: Equilibria | Cycles
+    """Return the problem of a solution's branch, and its first point."""
     solution = first.solution if isinstance(first, Bifurcation) else first
-    if isinstance(solution, Equilibrium):
-        if isinstance(first, Bifurcation) and first.kind is BifurcationKind.HOPF:
-            problem, point = Cycles.at_hopf(solution, name, first.vectors[vector], first.frequency)
-            problem.set_ranges(np.array([size]))
-            return problem, point
-        equations = resting_equations("follow", solution.scene)
-        problem = Equilibria(solution.scene, equations, (name,), solution.state, solution.shifts, solution.speeds)
-        tangent = np.zeros(len(problem.point))
-        if isinstance(first, Bifurcation) and leaves:
-            tangent[: problem.size] = sign * first.vectors[vector].real
-    elif isinstance(first, Bifurcation) and leaves:
-        factor = 2 if first.kind is BifurcationKind.PERIOD_DOUBLING else 1
-        problem, point = Cycles.leaving(solution, name, sign * first.vectors[vector].real, factor)
-        tangent = point.tangent
-    else:
-        problem = Cycles.of(solution, name)
-        tangent = np.zeros(len(problem.point))
+    problem: Equilibria | Cycles
+    problem = Equilibria.of(solution, name) if isinstance(solution, Equilibrium) else Cycles.of(solution, name)
     problem.set_ranges(np.array([size]))
-    if leaves:
-        if isinstance(problem, Equilibria):
-            problem.scale_along(tangent[: problem.size])
-        return problem, Point(problem.point, tangent / float(np.linalg.norm(problem.weights * tangent)), 0)
+    tangent = np.zeros(len(problem.point))
     tangent[-1] = sign / problem.weights[-1]
     found = correct(problem, problem.point, tangent)
     if found is None:
@@ -262,6 +249,45 @@ def _begin(
         problem.scale_along(found.tangent[: problem.size])
     z, tangent = problem.accept(found.z, found.tangent)
     return problem, Point(z, tangent, 0, problem.critical(z))
+
+
+def _leave(first: Bifurcation, name: str, sign: float, vector: int, size: float) -> tuple[Equilibria | Cycles, Point]:
+    """Return the problem of the branch that leaves a bifurcation, and its first point, without critical values."""
+    solution, kind = first.solution, first.kind
+    if not 0 <= vector < len(first.vectors):
+        raise ValueError(f"vector: found {vector}; expected a number below {len(first.vectors)}")
+    # Along another parameter than that of the known branch the states are taken to stay.
+    known = first.tangent if first.tangent.size and first.name == name else np.append(0.0 * solution.state, 1.0)
+    along, change = first.vectors[vector].real, known[:-1]
+    problem: Equilibria | Cycles
+    if isinstance(solution, PeriodicOrbit):
+        factor = 2 if kind is BifurcationKind.PERIOD_DOUBLING else 1
+        problem, along, change = Cycles.leaving(solution, name, along, change, factor)
+    elif kind is BifurcationKind.HOPF:
+        problem, along = Cycles.at_hopf(solution, name, first.vectors[vector], first.frequency)
+    else:
+        problem = Equilibria.of(solution, name)
+    problem.set_ranges(np.array([size]))
+    if isinstance(problem, Equilibria):
+        problem.scale_along(along)
+    point = leave(problem, along, np.append(change, known[-1])) if kind is BifurcationKind.BRANCH_POINT else None
+    point = problem.start(along) if point is None else point
+    return problem, replace(point, tangent=sign * point.tangent)
+
+
+def _no_branch(first: Bifurcation, name: str, bounds: tuple[float, float], parts: list[Part]) -> Exception:
+    """Return the error for a bifurcation from which no branch was followed."""
+    value = first.solution.scene.parameters[name]
+    if any(end.startswith("lost") for *_, end in parts):
+        return ArithmeticError(
+            f"follow: found no branch beside the known one at the {first.kind} at {name} = {value:.8g}; expected one; try "
+            "another vector, a smaller largest_step, or `equilibria` or `periodic_orbit` beside it"
+        )
+    side = "below" if value == bounds[0] else "above"
+    return ValueError(
+        f"follow: found bounds {bounds[0]:.8g}, {bounds[1]:.8g} for a branch that begins {side} {name} = {value:.8g}; "
+        "expected bounds on both sides, as it may turn back; give within=(low, high)"
+    )
 
 
 def _check_name(scene: Scene, name: str) -> None:
@@ -321,7 +347,7 @@ def _trace(problem: Equilibria | Cycles, start: Point, limits: Limits) -> Part:
             found.append(_bifurcation(problem, each))
             if found[-1].kind in BORN and each.kind is BifurcationKind.BRANCH_POINT:
                 # The branch is born there; beyond it are the same cycles, shifted in time.
-                return points, found, f"{found[-1].kind} at {problem.names[-1]} = {each.point.value:.8g}"
+                return points, found, f"{found[-1].kind} at {problem.names[-1]} = {found[-1].value:.8g}"
     end = f"{each}: homoclinic?" if str(each).startswith("period") else str(each)
     corner = corners.at_end([point for point, _ in points]) if corners and end.startswith("lost") else None
     if corner is not None:
@@ -345,9 +371,11 @@ def _corner(problem: Equilibria | Cycles, corner: Corner) -> Bifurcation:
 
 def _bifurcation(problem: Equilibria | Cycles, located: Located) -> Bifurcation:
     """Compute what belongs to a located bifurcation."""
-    point, critical = located.point, located.point.critical
-    if critical is None:
-        raise RuntimeError("a bifurcation without critical values")
+    point, critical = located.point, critical_of(located.point)
+    crosses = located.kind is BifurcationKind.BRANCH_POINT
+    kind = problem.birth(point.z) if crosses and isinstance(problem, Cycles) else None
+    if kind and isinstance(problem, Cycles) and (origin := _birth(problem, point, kind)):
+        return origin
     value, block = located.critical, int(critical.blocks[located.index])
     solution, count = problem.solution(point), located.multiplicity
     coefficient = math.nan
@@ -368,12 +396,16 @@ def _bifurcation(problem: Equilibria | Cycles, located: Located) -> Bifurcation:
     else:
         vectors = directions(problem.scene, solution.state, problem.vectors(point.z, 0.0, count))
         mode = problem.blocks.text(block) if problem.blocks is not None and block >= 0 else ""
-    kind = located.kind
-    if isinstance(problem, Cycles) and kind is BifurcationKind.BRANCH_POINT:
-        kind = problem.birth(point.z) or kind
+    tangent = np.zeros(0)
+    if crosses:
+        count_of_states = problem.flow.size if isinstance(problem, Cycles) else problem.size
+        change = point.tangent[:count_of_states]
+        if isinstance(problem, Cycles):
+            change = expansion(problem.scene.equations, problem.classes, count_of_states) @ change
+        tangent = np.append(change, point.tangent[-1])
     return Bifurcation(
         point.value,
-        kind,
+        located.kind,
         abs(critical.growth[located.index]) / located.scale,
         solution,
         problem.names[-1],
@@ -383,7 +415,50 @@ def _bifurcation(problem: Equilibria | Cycles, located: Located) -> Bifurcation:
         vectors.astype(complex),
         mode,
         coefficient,
+        tangent,
     )
+
+
+def _birth(problem: Cycles, point: Point, kind: BifurcationKind) -> Bifurcation | None:
+    """Return the bifurcation of the equilibrium, or of the cycle of half the period, at which cycles are born.
+
+    Cycles vanish there with the root of the distance, the growth of their origin is linear in it.
+    """
+    orbit, name = problem.solution(point), problem.names[-1]
+    parent: Equilibria | Cycles
+    try:
+        if kind is BifurcationKind.HOPF:
+            copies = expansion(orbit.scene.equations, problem.classes, problem.flow.size)
+            parent = Equilibria.of(equilibrium(orbit.scene, copies @ problem.orbit_states(point.z).mean(axis=0)), name)
+            target = 2j * math.pi / orbit.period
+        else:
+            half = problem.states(point.z)[: (problem.segments + 1) // 2]
+            period, periods = 0.5 * orbit.period, problem.periods // 2
+            parent = Cycles.near(orbit.scene, problem.names, problem.classes, half, period, periods)
+            target = -1.0 + 0.0j
+        span = float(problem.spans[-1])
+        parent.set_ranges(np.array([span]))
+
+        def located(value: float) -> Located:
+            """Return the parent's solution at a value of the parameter with the critical value nearest to the target."""
+            solution = at_value(parent, np.append(parent.point[:-1], value))
+            if solution is None:
+                raise ArithmeticError(f"no solution at {name} = {value:g}")
+            critical = parent.critical(solution.z)
+            distances = abs(critical.values - target)
+            together = int((distances < distances.min() + TOGETHER * critical.scale).sum())
+            solution = replace(solution, critical=critical, length=point.length)
+            return Located(kind, solution, int(distances.argmin()), critical.scale, together)
+
+        def growth(value: float) -> float:
+            each = located(value)
+            return float(critical_of(each.point).growth[each.index])
+
+        value = newton(growth, point.value, x1=point.value + FIRST_SHIFT * span, tol=1e-14 * span, rtol=1e-14)
+        found = located(float(value))
+    except (ArithmeticError, RuntimeError):  # the origin has no solution there
+        return None
+    return _bifurcation(parent, found) if abs(found.critical - target) < SAME_VALUE * abs(target) else None
 
 
 def _joined(name: str, parts: list[Part]) -> Branch:

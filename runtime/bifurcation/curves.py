@@ -36,7 +36,7 @@ from synchain.models.inputs.checks import check_keys, check_number, check_table,
 from .arclength import FIRST_STEP, LARGEST_STEP, MOST, Limits, Point, correct, walk
 from .critical_curve import CriticalCurve
 from .cycle_curves import CycleCurve
-from .detection import REAL, BranchStep
+from .detection import REAL, TOGETHER, BranchStep
 from .equilibrium import Equilibrium
 from .equilibrium_curves import EquilibriumCurve
 from .kinds import BifurcationKind
@@ -68,13 +68,18 @@ def _points(problem: CriticalCurve, step: BranchStep) -> Iterator[tuple[float, C
         if test(ends[1]) <= 0.0:
             yield point(name, step.zero(test))
             return
+    cusps = list[float]()
     for name, test in problem.tests().items():
         one, other = map(test, ends)
         if one * other < 0.0:
+            cusps += [step.zero(test)] if name == "cusp" else []
             yield point(name, step.zero(test))
     for place, name in zip((-2, -1), problem.names, strict=True):
         if ends[0].tangent[place] * ends[1].tangent[place] < 0.0:
-            yield point(f"extreme {name}", step.zero(lambda at, place=place: float(at.tangent[place])))  # type: ignore[misc]
+            distance = step.zero(lambda at, place=place: float(at.tangent[place]))  # type: ignore[misc]
+            # Parameters turn at a cusp, too.
+            if all(abs(distance - cusp) > TOGETHER * step.length for cusp in cusps):
+                yield point(f"extreme {name}", distance)
     counts = sorted(at.critical.growing for at in ends if at.critical is not None)
     index = counts[0]
     while index < counts[1]:

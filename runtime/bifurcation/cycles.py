@@ -147,8 +147,8 @@ class Cycles:
         return problem
 
     @classmethod
-    def at_hopf(cls, rest: Equilibrium, name: str, vector: np.ndarray, frequency: float) -> tuple[Cycles, Point]:
-        """Return the cycles that are born at a Hopf point, and their first point. Shapes: vector (states,) complex."""
+    def at_hopf(cls, rest: Equilibrium, name: str, vector: np.ndarray, frequency: float) -> tuple[Cycles, np.ndarray]:
+        """Return the cycles born at a Hopf point, and their first direction (n,). Shapes: vector (states,) complex."""
         classes = _classes_of(rest.scene, np.stack([rest.state, vector.real, vector.imag]))
         # Real and imaginary part of the eigenvector are orthogonal; the phase of the cycle is fixed across the second.
         vector = vector * np.exp(-0.5j * np.angle(np.sum(vector**2)))
@@ -162,21 +162,28 @@ class Cycles:
         problem.scale = size * np.maximum(np.abs(wave) / np.abs(wave).max(), 1e-3)
         problem.phase = (-wave.imag / problem.scale / np.linalg.norm(wave.imag / problem.scale))[None]
         problem.speed = 0.0
-        return problem, problem.start(wave.real)
+        real, imaginary = wave.real / problem.scale, wave.imag / problem.scale
+        return problem, wave.real - float(real @ imaginary) / float(imaginary @ imaginary) * wave.imag
 
     @classmethod
-    def leaving(cls, orbit: PeriodicOrbit, name: str, vector: np.ndarray, factor: int) -> tuple[Cycles, Point]:
-        """Return the branch that leaves an orbit along a direction (states,), and its first point.
+    def leaving(
+        cls, orbit: PeriodicOrbit, name: str, vector: np.ndarray, known: np.ndarray, factor: int
+    ) -> tuple[Cycles, np.ndarray, np.ndarray]:
+        """Return the problem of the branch that leaves an orbit along a vector (states,), and that vector on the quotient.
 
-        `factor` is the number of periods in a period of the new branch: 2 at a period doubling.
+        `known` (states,), the change of the states along the known branch, is returned on the quotient too.  `factor` is
+        the number of periods in a period of the new branch: 2 at a period doubling.
         """
         classes = _classes_of(orbit.scene, np.stack([orbit.state, vector]))
         copies = expansion(orbit.scene.equations, classes, len(vector) * len(set(classes)) // orbit.scene.n)
-        state, direction = ((copies.T @ each) / copies.sum(axis=0) for each in (orbit.state, vector))
+        rows = (orbit.state, np.broadcast_to(orbit.extent, len(vector)), vector, known)
+        state, extent, *along = ((copies.T @ each) / copies.sum(axis=0) for each in rows)
         drive_periods = 0 if orbit.free else orbit.periods * factor
         states = np.tile(state, (factor, 1))
         problem = cls.near(orbit.scene, (name,), classes, states, orbit.period * factor, drive_periods)
-        return problem, problem.start(direction)
+        problem.scale = np.maximum(problem.scale, extent)  # the orbit may vanish there
+        problem._refer(problem.point)
+        return problem, along[0], along[1]
 
     def start(self, direction: np.ndarray) -> Point:
         """Return the reference with a tangent along a direction (n,) of the first state; that of others follows the flow."""
@@ -185,7 +192,7 @@ class Cycles:
         for i in range(self.segments):
             tangent[i * len(direction) : (i + 1) * len(direction)] = moved
             moved = image.propagators[i] @ moved
-        return Point(self.point, tangent / float(np.linalg.norm(self.weights * tangent)), 0)
+        return Point(self.point, self._at_phase(tangent), 0)
 
     # --- unknowns ---
     @property
@@ -297,14 +304,17 @@ class Cycles:
         if not self.speed / RESCALED < speed < self.speed * RESCALED:
             self._rescale(z)
         self._refer(z)
+        return z, self._at_phase(tangent)
+
+    def _at_phase(self, tangent: np.ndarray) -> np.ndarray:
+        """Return a tangent of length 1 without its motion along the cycle, which is no change of the cycle."""
         if not self.periods:
-            # Cycles are fixed at another phase now: move the tangent along them, which is no change of the cycle.
-            rates, count = self.flow.rates(self.values(z), self.states(z)), self.phase.size
+            rates, count = self.flow.rates(self.values(self.point), self.states(self.point)), self.phase.size
             size = float(np.linalg.norm(rates / self.scale))
             ahead = tangent[:count].reshape(self.phase.shape)
             share = float(np.sum(self.phase * ahead / self.scale)) / size if size > 0.0 else 0.0
             tangent = np.append(ahead - share * rates, tangent[count:])
-        return z, tangent / float(np.linalg.norm(self.weights * tangent))
+        return tangent / float(np.linalg.norm(self.weights * tangent))
 
     def _finer(self) -> int:
         """Return the factor of the next finer division; with a drive a segment has whole periods of the drive."""

@@ -41,8 +41,12 @@ BESIDE, CLEAR = (1e-3, 5e-3, 0.025), 1e-7
 """Distance from a turn, relative to the step, at which the value that passes or touches zero is compared: the
 first at which it differs from zero by CLEAR, relative to the largest value (choices)."""
 
-NODES = 9
-"""Solutions of a step from which its turning point at a branch point is computed (a choice)."""
+MOST_HALVINGS = 1000
+"""Most evaluations for a zero: a multiple one takes some hundred (a choice)."""
+
+NODES, NEAR = 9, 1e-3
+"""Solutions of a step from which a branch point is computed, and its largest distance from where it was looked for,
+relative to half of the step (choices)."""
 
 REAL = 1e-7
 """A value whose imaginary part is smaller, relative to the largest value, is real: the square root of rounding."""
@@ -61,12 +65,12 @@ class Located:
     @property
     def critical(self) -> complex:
         """The value that passes; real if its imaginary part is a rounding error."""
-        critical = _critical(self.point)
+        critical = critical_of(self.point)
         value = complex(critical.values[self.index])
         return value if abs(value.imag) > REAL * critical.scale else complex(value.real)
 
 
-def _critical(point: Point) -> GrowthNumbers:
+def critical_of(point: Point) -> GrowthNumbers:
     """Return the critical values of a solution that has some."""
     if point.critical is None:
         raise RuntimeError("critical values were not computed")
@@ -98,37 +102,52 @@ class BranchStep:
 
     def scale(self, point: Point) -> float:
         """Return the size of the critical values; a single value, which is zero at a fold, is measured at both ends."""
-        one = len(_critical(point).values) == 1
-        return max(_critical(each).scale for each in ((self.before, self.after) if one else (point,)))
+        one = len(critical_of(point).values) == 1
+        return max(critical_of(each).scale for each in ((self.before, self.after) if one else (point,)))
 
     def zero(self, test: Callable[[Point], float]) -> float:
         """Return the distance at which a function of the solution passes zero."""
         ends = test(self.before), test(self.after)
         if ends[0] * ends[1] >= 0.0:  # one end is zero to rounding
             return 0.0 if abs(ends[0]) < abs(ends[1]) else self.length
-        return float(brentq(lambda h: test(self.at(h)), 0.0, self.length, xtol=1e-14 * self.length, rtol=1e-14))
+        tolerance = 1e-14 * self.length
+        return float(
+            brentq(lambda h: test(self.at(h)), 0.0, self.length, xtol=tolerance, rtol=1e-14, maxiter=MOST_HALVINGS)
+        )
 
     def zero_of_growth(self, index: int) -> float:
         """Return the distance at which the growth of a critical value passes zero."""
-        return self.zero(lambda point: float(_critical(point).growth[index]))
+        return self.zero(lambda point: float(critical_of(point).growth[index]))
 
-    def turning_point(self, distance: float) -> Point:
-        """Return the solution at which the parameter turns near a distance, at a branch point.
+    def tangent(self, distance: float) -> np.ndarray:
+        """Return the tangent at a branch point, where Newton's method finds none: the mean of those on both sides."""
+        sides = (min(max(distance + d * self.length, 0.0), self.length) for d in (-BESIDE[0], BESIDE[0]))
+        return np.asarray(np.mean([self.at(side).tangent for side in sides], axis=0))
+
+    def branch_point(self, distance: float, index: int | None) -> Point:
+        """Return the branch point near a distance, where a growth passes zero, or for None where the parameter turns.
 
         Newton's method has few digits there.  The solution follows from a polynomial through NODES regular ones.
         """
-        nodes = -np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
-        solutions = np.array([self.at(float(0.5 * self.length * (1.0 + x))).z for x in nodes])
-        coefficients = np.linalg.solve(chebyshev.chebvander(nodes, NODES - 1), solutions)
-        roots = chebyshev.chebroots(chebyshev.chebder(coefficients[:, -1]))
-        real = roots[np.abs(roots.imag) < TOUCHING].real
+        nodes = -np.cos(np.pi * (np.arange(NODES + 1) + 0.5) / (NODES + 1))
         guess = 2.0 * distance / self.length - 1.0
-        x = float(real[np.abs(real - guess).argmin()]) if len(real) else guess
-        z = np.asarray(chebyshev.chebval(x, coefficients))
-        point = self.at(distance)
-        return replace(
-            point, z=z, critical=self.problem.critical(z), length=self.before.length + 0.5 * self.length * (1.0 + x)
-        )
+        nodes = np.delete(nodes, np.abs(nodes - guess).argmin())
+        points = [self.at(float(0.5 * self.length * (1.0 + x))) for x in nodes]
+        columns = np.array([point.z for point in points]).T
+        if index is not None:
+            columns = np.vstack([columns, [critical_of(point).growth[index] for point in points]])
+        coefficients = np.linalg.solve(chebyshev.chebvander(nodes, NODES - 1), columns.T)
+        test = coefficients[:, -1]
+        roots = chebyshev.chebroots(chebyshev.chebder(test) if index is None else test)
+        real = roots[np.abs(roots.imag) < TOUCHING].real
+        # Where values meet, the sorted growths are not smooth.
+        rough = index is not None and np.abs(test[-2:]).max() > CLEAR * np.abs(test).max()
+        if rough or not len(real) or np.abs(real - guess).min() > NEAR:
+            return self.at(distance)
+        x = float(real[np.abs(real - guess).argmin()])
+        z = np.asarray(chebyshev.chebval(x, coefficients))[: len(self.before.z)]
+        length = self.before.length + 0.5 * self.length * (1.0 + x)
+        return replace(self.at(distance), z=z, critical=self.problem.critical(z), length=length)
 
 
 def bifurcations(
@@ -137,7 +156,7 @@ def bifurcations(
     """Return the bifurcations on a step with their distances from its beginning; None if the step is too long."""
     step = BranchStep(problem, before, after, length)
     turned = before.tangent[-1] * after.tangent[-1] < 0.0
-    counts = sorted((_critical(before).growing, _critical(after).growing))
+    counts = sorted((critical_of(before).growing, critical_of(after).growing))
     if counts[0] == counts[1] and not turned:
         return []
     try:
@@ -152,7 +171,7 @@ def _found(step: BranchStep, indices: range, turned: bool) -> list[tuple[float, 
     turn = step.zero(lambda point: float(point.tangent[-1])) if turned else None
     located = [*_passing(step, indices, turn)]
     if turn is not None and not any(each.kind is BifurcationKind.FOLD for _, each in located):
-        critical = _critical(step.at(turn))
+        critical = critical_of(step.at(turn))
         touching = int(abs(critical.growth).argmin())
         scale = step.scale(step.at(turn))
         if abs(critical.growth[touching]) > TOUCHING * scale:
@@ -167,14 +186,17 @@ def _found(step: BranchStep, indices: range, turned: bool) -> list[tuple[float, 
             kind = problem.kind(complex(critical.values[touching].real), sides[0] * sides[1] < 0.0)
             point = step.at(turn)
             if kind is not BifurcationKind.FOLD:  # a flat turn has no digits in either form: take the better one
-                point = min((point, step.turning_point(turn)), key=lambda each: abs(_nearest(each)))
+                point = min((point, step.branch_point(turn, None)), key=lambda each: abs(_nearest(each)))
             located.append((turn, Located(kind, point, touching, scale)))
+    for k, (distance, each) in enumerate(located):
+        if each.kind is BifurcationKind.BRANCH_POINT:
+            located[k] = distance, replace(each, point=replace(each.point, tangent=step.tangent(distance)))
     return [*_together(located, length)]
 
 
 def _nearest(point: Point) -> float:
     """Return the growth nearest to zero."""
-    growth = _critical(point).growth
+    growth = critical_of(point).growth
     return float(growth[abs(growth).argmin()])
 
 
@@ -183,16 +205,19 @@ def _passing(step: BranchStep, indices: range, turn: float | None) -> Iterator[t
     index = indices.start
     while index < indices.stop:
         distance = step.zero_of_growth(index)
-        critical = _critical(step.at(distance))
+        critical = critical_of(step.at(distance))
         paired = abs(critical.values[index].imag) > REAL * critical.scale
         turned = False
         if turn is not None and not paired:  # the value that passes is neutral at the turn
-            turned = abs(float(_critical(step.at(turn)).growth[index])) <= TOUCHING * step.scale(step.at(turn))
+            turned = abs(float(critical_of(step.at(turn)).growth[index])) <= TOUCHING * step.scale(step.at(turn))
         if turned and turn is not None:
             distance = turn  # a fold is located better by the turn: the value is a square root of the parameter
         value = complex(critical.values[index])
-        kind = step.problem.kind(value if paired else complex(value.real), turned)
-        yield distance, Located(kind, step.at(distance), index, step.scale(step.at(distance)))
+        kind, point = step.problem.kind(value if paired else complex(value.real), turned), step.at(distance)
+        scale = step.scale(point)
+        if kind is BifurcationKind.BRANCH_POINT:
+            point = step.branch_point(distance, index)
+        yield distance, Located(kind, point, index, scale)
         index += 2 if paired else 1
 
 

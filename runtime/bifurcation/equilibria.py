@@ -21,7 +21,7 @@ from synchain.models.scenes.scene import Scene
 from ..cells.run_keywords import with_numbers
 from .arclength import Point
 from .eigenvalues import ModeBlocks, eigenvalues
-from .equilibrium import Equilibrium
+from .equilibrium import Equilibrium, resting_equations
 from .kinds import BifurcationKind
 from .linearised import Linearised
 from .problems import GrowthNumbers, Matrix
@@ -35,8 +35,8 @@ LEAST_SCALE = 0.1
 SHRINK = 64.0
 """Factor by which the scale of states near zero is lowered, and the ratio of rates at which it is low enough (a choice)."""
 
-ORIGIN = 1e-12
-"""States that are smaller than this part of the scale are zero to rounding (a choice)."""
+ORIGIN = 1e-7
+"""States that are smaller than this part of the scale are zero: at a turn they are known to the root of rounding (a choice)."""
 
 TINY = 1e-8
 """A parameter without bounds that is smaller does not set its own length (a choice)."""
@@ -79,6 +79,16 @@ class Equilibria:
         self.ranges, self.unbounded = np.zeros(len(names)), np.full(len(names), True)
         self.weights = np.zeros(len(self.point))
         self._weigh()
+
+    @classmethod
+    def of(cls, rest: Equilibrium, *names: str) -> Equilibria:
+        """Return the problem of an equilibrium along parameters."""
+        return cls(rest.scene, resting_equations("follow", rest.scene), names, rest.state, rest.shifts, rest.speeds)
+
+    def start(self, direction: np.ndarray) -> Point:
+        """Return the reference with a tangent along a direction (states,)."""
+        tangent = np.append(direction, np.zeros(len(self.point) - self.size))
+        return Point(self.point, tangent / float(np.linalg.norm(self.weights * tangent)), 0)
 
     def set_ranges(self, ranges: np.ndarray) -> None:
         """Measure parameters by the lengths of their ranges; one without bounds, inf, by its largest value so far."""

@@ -88,6 +88,8 @@ class Bifurcation(Labelled):
         The mode of the graph that grows, if the eigenvalues belong to modes.
     lyapunov : float
         First Lyapunov coefficient of a Hopf point: negative if a stable cycle is born (supercritical).  NaN elsewhere.
+    tangent : ndarray, shape (states + 1,)
+        Direction of the branch at a branch point: change of the states, then of the parameter.  Empty elsewhere.
 
     See Also
     --------
@@ -105,6 +107,7 @@ class Bifurcation(Labelled):
     vectors: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
     mode: str = ""
     lyapunov: float = float("nan")
+    tangent: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def orbit(self) -> PeriodicOrbit:

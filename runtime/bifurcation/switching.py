@@ -1,29 +1,44 @@
-"""Directions of the branches that leave a branch point of a network with symmetry.
+"""Directions of the branches that leave a branch point.
 
-The null space of the Jacobian at a branch point is mapped to itself by the automorphisms of the graph.  By the
+The equations R(z) = 0 of a problem have two null vectors at a simple branch point: the tangent t of the branch that is
+known, and w.  The tangent a t + w of the other branch solves the algebraic bifurcation equation
+2 a u R_zz t w + u R_zz w w = 0 with the left null vector u (Keller).
+
+In a network with symmetry the null space of the Jacobian at a branch point is mapped to itself by the automorphisms of the graph.  By the
 equivariant branching lemma there is a branch along each line of the null space that is the fixed space of a group of
 automorphisms.  Lines that an automorphism maps to each other give images of one branch: one line of each class is
 returned.  At a Hopf point a shift in time changes the phase of an eigenvector, so that lines which automorphisms map to
 themselves up to a phase count as well: rotating and standing waves of a ring.
 
-Source: Golubitsky, Stewart & Schaeffer, Singularities and Groups in Bifurcation Theory, volume 2 (Springer, 1988),
+Sources: Keller, in Rabinowitz (ed.), Applications of Bifurcation Theory (Academic Press, 1977), pages 359-384; Golubitsky, Stewart & Schaeffer, Singularities and Groups in Bifurcation Theory, volume 2 (Springer, 1988),
 theorems XIII.3.2 and XVI.4.1.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from synchain.models.scenes.scene import Scene
 from synchain.models.symmetries.automorphisms import automorphisms
 
 from ..results.labels import States
+from .arclength import Point
+from .problems import BranchProblem, Matrix
 
 MOST_NODES, MOST_AUTOMORPHISMS = 60, 2000
 """Largest graphs of which automorphisms are listed, and most automorphisms (choices)."""
 
 MOST_SPACES = 300
 """Most fixed spaces that are intersected (a choice)."""
+
+STEP = 1e-3
+"""Distance at which second derivatives are measured beside a branch point, in the metric of a problem (a choice)."""
+
+NULL, SHIFT, MOST_VECTORS = 1e-6, 1e-12, 12
+"""Singular values that count as zero and the shift of inverse iteration, relative to a scale of the entries; most null vectors
+of a sparse matrix (choices)."""
 
 SAME = 1e-6
 """Largest difference of vectors of one line, and of a state and its image (a choice)."""
@@ -72,6 +87,65 @@ def directions(scene: Scene, state: np.ndarray, basis: np.ndarray) -> np.ndarray
             if not any(abs(abs(np.vdot(image, known)) - 1.0) < SAME for image in images for known in lines):
                 lines.append(line)
     return np.array([basis @ line for line in lines]) if lines else basis.T
+
+
+def leave(problem: BranchProblem, vector: np.ndarray, known: np.ndarray) -> Point | None:
+    """Return a problem's point with the tangent of the branch that crosses a known one there; None if none crosses.
+
+    Shapes: vector (n,), change of the first states along the new branch; known (n + 1,), the tangent of the known one: of
+    the first states and of the parameter.
+    """
+    weights = problem.weights
+    measured = weights > 0.0
+    units = 1.0 / np.where(measured, weights, 1.0)
+    places = [*range(len(vector)), -1]
+
+    def slopes(z: np.ndarray) -> Matrix:
+        return problem.linearise(z)[1] * units
+
+    # All slopes of a single state vanish at its branch point: their change in a unit of length is a scale, too.
+    matrix = slopes(problem.point)
+    scale = max(abs(matrix).max(), abs(slopes(problem.point + STEP * units * measured) - matrix).max() / STEP)
+    left, right = null_spaces(matrix, scale)
+    if right.shape[1] < 2:  # a branch point along another parameter is none along this one
+        return None
+
+    def completed(part: np.ndarray) -> np.ndarray:
+        """Return the null vector with some first states and parameter, of length 1."""
+        whole = right @ np.linalg.lstsq(right[places], part / units[places])[0]
+        return np.asarray(whole / np.linalg.norm(whole[measured]))
+
+    tangent, other = completed(known), completed(np.append(vector, 0.0))
+    if (
+        abs(other[measured] @ tangent[measured]) > 1.0 - SAME
+    ):  # the known branch was born here: the other goes on with p
+        other = right @ right[-1]
+    other -= (other[measured] @ tangent[measured]) * tangent
+    other /= np.linalg.norm(other[measured])
+    plus, minus = (slopes(problem.point + h * units * other) for h in (STEP, -STEP))
+    mixed, square = (left.T @ ((plus @ v - minus @ v) / (2.0 * STEP)) for v in (tangent, other))
+    share = 0.5 * float(mixed @ square) / float(mixed @ mixed or 1.0)
+    new = other - share * tangent
+    size = float(np.linalg.norm(new[measured]))
+    return Point(problem.point, units * new / size, 0, crossing=units * tangent)
+
+
+def null_spaces(matrix: Matrix, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return orthonormal bases of the left (size, k) and right (size + 1, k + 1) null space of a matrix (size, size + 1)."""
+    if isinstance(matrix, np.ndarray):
+        left, sizes, rows = np.linalg.svd(matrix)
+        null = sizes < NULL * scale
+        return left[:, null], np.vstack([rows[:-1][null], rows[-1]]).T
+    # Inverse iteration for the smallest singular values, with a row of zeros below the matrix.
+    size = matrix.shape[1]
+    square = sparse.csc_array(sparse.vstack([matrix, sparse.csc_array((1, size))]))
+    solver = splu(sparse.csc_array(square + SHIFT * scale * sparse.eye_array(size)))
+    left = np.random.default_rng(0).normal(size=(size, min(MOST_VECTORS, size)))
+    for _ in range(4):
+        right = np.linalg.qr(solver.solve(left))[0]
+        left = np.linalg.qr(solver.solve(right, trans="T"))[0]
+    null = np.linalg.norm(square @ right, axis=0) < NULL * scale
+    return left[:-1, null], right[:, null]
 
 
 def _fixed(action: np.ndarray) -> list[np.ndarray]:
