@@ -21,6 +21,9 @@ DENSE = 2000
 FEW = 12
 """Number of eigenvalues of larger networks, unless `count` is given (a choice)."""
 
+SMALL = 64
+"""Most states of which matrices are dense (a choice)."""
+
 ASIDE = 1e-6
 """Few eigenvalues are computed around this point, in units of the largest entry of J; 0 is an eigenvalue of each
 shift."""
@@ -92,12 +95,15 @@ class ModeBlocks:
     def matrices(self, jacobian: sparse.csc_array) -> tuple[np.ndarray, np.ndarray] | None:
         """Return A and H (components, components) of a Jacobian A (x) I - H (x) L, None if it has another form."""
         i, j, weight, degree = self.link
-        places = self.n * np.arange(self.components)
-        coupling = jacobian[np.ix_(places + i, places + j)].toarray() / weight
-        own = jacobian[np.ix_(places + i, places + i)].toarray() + degree * coupling
-        rebuilt = sparse.kron(own, sparse.eye_array(self.n)) - sparse.kron(coupling, self.laplacian)
-        difference = abs(jacobian - rebuilt).max()
-        return (own, coupling) if difference <= BLOCKS * abs(jacobian).max() else None
+        rows, places = jacobian.tocsr(), self.n * np.arange(self.components)
+        at_target, at_source = (rows[places + i][:, places + k].toarray() for k in (i, j))
+        coupling = at_source / weight
+        own, limit = at_target + degree * coupling, BLOCKS * abs(jacobian).max()
+        if jacobian.shape[0] <= SMALL:
+            rebuilt = np.kron(own, np.eye(self.n)) - np.kron(coupling, self.laplacian.toarray())
+            return (own, coupling) if np.abs(jacobian.toarray() - rebuilt).max() <= limit else None
+        sparse_parts = sparse.kron(own, sparse.eye_array(self.n)) - sparse.kron(coupling, self.laplacian)
+        return (own, coupling) if abs(jacobian - sparse_parts).max() <= limit else None
 
     def values(self, jacobian: sparse.csc_array) -> tuple[np.ndarray, np.ndarray] | None:
         """Return all eigenvalues and the mode of each, None if the Jacobian has no blocks."""

@@ -8,7 +8,6 @@ are left out of the critical values.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -20,7 +19,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.run_keywords import with_numbers
 from .arclength import Point
-from .eigenvalues import ModeBlocks, eigenvalues
+from .eigenvalues import SMALL, ModeBlocks, eigenvalues
 from .equilibrium import Equilibrium, resting_equations
 from .kinds import BifurcationKind
 from .linearised import Linearised
@@ -78,6 +77,7 @@ class Equilibria:
         self.component_scales = np.zeros(len(equations.components))
         self.ranges, self.unbounded = np.zeros(len(names)), np.full(len(names), True)
         self.weights = np.zeros(len(self.point))
+        self.last: tuple[bytes, Linearised, list[Linearised]] = b"", self.network, self.by_parameters
         self._weigh()
 
     @classmethod
@@ -117,8 +117,7 @@ class Equilibria:
         """Scale states near zero by the equations along a direction (states,) in which the branch leaves."""
         if not direction.any():
             return
-        state, _, values = self.split(self.point)
-        network, by_parameter = self.network.at(values), self.by_parameters[0].at(values)
+        state, _, network, (by_parameter, *_) = self._at(self.point)
         unit, scale = direction / np.abs(direction).max(), 1.0
         rates, slope = network.rates(state), network.jacobian(state) @ unit
         shift, slope_shift = by_parameter.rates(state), by_parameter.jacobian(state) @ unit
@@ -137,16 +136,19 @@ class Equilibria:
             self.component_scales[:] = scale
             self._weigh()
 
-    @cached_property
-    def higher(self) -> tuple[Linearised, Linearised]:
-        """The second and third derivatives of the rates along a direction."""
-        return self.network.along(2), self.network.along(3)
-
     def split(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
         """Return state, speeds and the values of all parameters."""
         end = len(z) - len(self.names)
         chosen = dict(zip(self.names, map(float, z[end:]), strict=True))
         return z[: self.size], z[self.size : end], {**self.values, **chosen}
+
+    def _at(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, Linearised, list[Linearised]]:
+        """Return state, speeds, and the equations with the parameters of z; the last ones are kept."""
+        state, speeds, values = self.split(z)
+        key = z[len(z) - len(self.names) :].tobytes()
+        if self.last[0] != key:
+            self.last = key, self.network.at(values), [each.at(values) for each in self.by_parameters]
+        return state, speeds, *self.last[1:]
 
     def bordered(self, jacobian: sparse.csc_array) -> sparse.csc_array:
         """Return the derivative of the equations by state and speeds."""
@@ -156,23 +158,28 @@ class Equilibria:
 
     def linearise(self, z: np.ndarray) -> tuple[np.ndarray, Matrix]:
         """Return the remaining rates and pins, and their derivatives."""
-        state, speeds, values = self.split(z)
-        network, count = self.network.at(values), len(speeds)
-        residual = np.append(network.rates(state) - self.ones @ speeds, state[self.pinned] - self.point[self.pinned])
-        jacobian = network.jacobian(state)
-        columns = [np.append(each.at(values).rates(state), np.zeros(count)) for each in self.by_parameters]
-        matrix = sparse.hstack(
-            [self.bordered(jacobian), *(sparse.csc_array(c[:, None]) for c in columns)], format="csc"
-        )
-        if not (np.isfinite(residual).all() and np.isfinite(matrix.data).all()):
+        state, speeds, network, by_parameters = self._at(z)
+        rates, columns = network.rates(state), np.zeros((self.size + len(speeds), len(by_parameters)))
+        for k, each in enumerate(by_parameters):
+            columns[: self.size, k] = each.rates(state)
+        if not self.shifts and self.size <= SMALL:
+            residual, matrix = rates, np.hstack([network.dense_jacobian(state), columns])
+            entries = matrix
+        else:
+            residual = np.append(rates - self.ones @ speeds, state[self.pinned] - self.point[self.pinned])
+            whole = sparse.hstack([self.bordered(network.jacobian(state)), sparse.csc_array(columns)], format="csc")
+            entries, matrix = whole.data, whole.toarray() if self.size <= SMALL else sparse.csc_array(whole)
+        if not (np.isfinite(residual).all() and np.isfinite(entries).all()):
             raise ArithmeticError("a rate or its slope has no value")
-        return residual, matrix.toarray() if self.size <= 64 else sparse.csc_array(matrix)
+        return residual, matrix
 
     def noise(self, z: np.ndarray) -> np.ndarray:
         """Return the rounding errors of rates and pins."""
-        state, speeds, values = self.split(z)
-        sizes = self.network.at(values).term_sizes(state) + self.ones @ np.abs(speeds)
-        return NOISE * np.append(sizes, np.abs(state[self.pinned]))
+        state, speeds, network, _ = self._at(z)
+        sizes = network.term_sizes(state)
+        if not self.shifts:
+            return NOISE * sizes
+        return NOISE * np.append(sizes + self.ones @ np.abs(speeds), np.abs(state[self.pinned]))
 
     def accept(self, z: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pin the shifts at a solution and measure lengths by it."""
@@ -182,8 +189,7 @@ class Equilibria:
 
     def critical(self, z: np.ndarray) -> GrowthNumbers:
         """Return the eigenvalues of M^-1 J without those of the shifts."""
-        state, _, values = self.split(z)
-        network = self.network.at(values)
+        state, _, network, _ = self._at(z)
         jacobian, mass = network.jacobian(state), network.mass(state)
         found = self.blocks.values(jacobian) if self.blocks is not None else None
         numbers, modes = found or (eigenvalues(jacobian, mass), None)
@@ -211,8 +217,7 @@ class Equilibria:
 
     def vectors(self, z: np.ndarray, value: complex, count: int) -> np.ndarray:
         """Return eigenvectors (states, count) of M^-1 J for an eigenvalue of some multiplicity, orthonormal."""
-        state, _, values = self.split(z)
-        network = self.network.at(values)
+        state, _, network, _ = self._at(z)
         jacobian, mass = network.jacobian(state), network.mass(state)
         mass = sparse.eye_array(self.size, format="csc") if mass is None else mass
         # At zero the shifts are null vectors too: border the matrix, so that they are left out.

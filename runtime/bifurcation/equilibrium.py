@@ -39,7 +39,7 @@ from ..cells.run_keywords import Given
 from ..results.labelled import Labelled, dataset, scene_text
 from ..results.labels import STATE, States
 from ..sweeps.continued_start import StartValue, started
-from .eigenvalues import ModeBlocks, eigenvalues
+from .eigenvalues import SMALL, ModeBlocks, eigenvalues
 from .linearised import Linearised
 
 MOST_STEPS, HALVINGS = 100, 40
@@ -84,9 +84,6 @@ error of
 
 LEAST = 1e-12
 """Size of an eigenvalue that is a rounding error, relative to the fastest rate at the equilibrium (a choice)."""
-
-SMALL = 64
-"""Most unknowns of which the matrix is dense (a choice)."""
 
 BESIDE = 0.1
 """Relative distance at which slopes are measured beside a state: at a fold those at the state itself may vanish (a

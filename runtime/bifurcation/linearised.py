@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple, TypeAlias
 
@@ -101,17 +102,20 @@ class TemplateFunction:
 
     def evaluate(self, function: Values, state: np.ndarray) -> np.ndarray:
         """Evaluate one of the functions at a state of the network. Shapes: returns (expressions, count)."""
-        columns = [column for indices in self.inputs for column in state[indices].T]
+        states = [column for indices in self.inputs for column in state[indices].T]
         with np.errstate(all="ignore"):  # far from the start rates may overflow or have no value
-            results = function(*columns, *self.parameters)
-        count = len(self.inputs[0])
-        return np.array([np.broadcast_to(np.asarray(x, dtype=float), count) for x in results]).reshape(-1, count)
+            results = function(*states, *self.parameters)
+        columns = np.empty((len(results), len(self.inputs[0])))
+        for column, result in zip(columns, results, strict=True):
+            column[:] = result
+        return columns
 
 
 @dataclass(frozen=True, slots=True)
 class Linearised:
     """The equations M(x) dx/dt = r(x) of a network without a drive."""
 
+    equations: Equations
     dimension: int  # number of states
     rate_templates: tuple[TemplateFunction, ...]  # rates and blocks of the Jacobian
     mass_templates: tuple[TemplateFunction, ...]  # blocks of M alone; empty if M is the identity
@@ -121,12 +125,7 @@ class Linearised:
     @classmethod
     def of(cls, equations: Equations, values: Mapping[str, float]) -> Linearised:
         """Compile equations with the values of their parameters."""
-        templates = (*_node_templates(equations), *_link_templates(equations))
-        heavy = [each for each in templates if each.masses] if equations.inertial else []
-        masses = (TemplateFunction.of(each._replace(rates=()), equations.dimension, each.masses) for each in heavy)
-        rates = (TemplateFunction.of(each, equations.dimension, _slopes(each)) for each in templates)
-        made = cls(equations.dimension, tuple(rates), tuple(masses), templates, equations.constant_mass)
-        return made.at(values)
+        return _compiled(equations).at(values)
 
     def at(self, values: Mapping[str, float]) -> Linearised:
         """Return the equations with other values of their parameters; nothing is compiled."""
@@ -148,13 +147,7 @@ class Linearised:
 
         The first one has a Jacobian by x, r_xx u. Parameters have no values before `at`.
         """
-        templates = self.templates
-        for _ in range(order):
-            templates = tuple(each.along() for each in templates)
-        blocks = [_slopes(each) if order == 1 else [] for each in templates]
-        pairs = zip(templates, blocks, strict=True)
-        functions = (TemplateFunction.of(each, self.dimension, slopes) for each, slopes in pairs)
-        return replace(self, rate_templates=tuple(functions))
+        return _along(self.equations, order)
 
     def rates(self, state: np.ndarray) -> np.ndarray:
         """Return r (dimension,) at a state."""
@@ -174,6 +167,13 @@ class Linearised:
         """Return the derivative of r by the state, in sparse form."""
         return self._assemble(self.rate_templates, state)
 
+    def dense_jacobian(self, state: np.ndarray) -> np.ndarray:
+        """Return the derivative of r by the state; of few states a sparse form takes more time than its entries."""
+        matrix = np.zeros((self.dimension, self.dimension))
+        for each in self.rate_templates:
+            np.add.at(matrix, each.pattern, each.evaluate(each.entries, state))
+        return matrix
+
     def mass(self, state: np.ndarray) -> sparse.csc_array | None:
         """Return M in sparse form, None if it is the identity."""
         return self._assemble(self.mass_templates, state) if self.mass_templates else None
@@ -183,6 +183,29 @@ class Linearised:
         entries = np.concatenate([each.evaluate(each.entries, state).ravel() for each in templates])
         rows, columns = (np.concatenate([each.pattern[k].ravel() for each in templates]) for k in (0, 1))
         return sparse.csc_array(sparse.coo_array((entries, (rows, columns)), shape=(self.dimension, self.dimension)))
+
+
+@lru_cache(maxsize=64)
+def _compiled(equations: Equations) -> Linearised:
+    """Compile equations; their parameters have no values before `at`."""
+    templates = (*_node_templates(equations), *_link_templates(equations))
+    heavy = [each for each in templates if each.masses] if equations.inertial else []
+    masses = (TemplateFunction.of(each._replace(rates=()), equations.dimension, each.masses) for each in heavy)
+    rates = (TemplateFunction.of(each, equations.dimension, _slopes(each)) for each in templates)
+    return Linearised(equations, equations.dimension, tuple(rates), tuple(masses), templates, equations.constant_mass)
+
+
+@lru_cache(maxsize=64)
+def _along(equations: Equations, order: int) -> Linearised:
+    """Compile the derivative of an order of the rates along a direction."""
+    network = _compiled(equations)
+    templates = network.templates
+    for _ in range(order):
+        templates = tuple(each.along() for each in templates)
+    blocks = [_slopes(each) if order == 1 else [] for each in templates]
+    pairs = zip(templates, blocks, strict=True)
+    functions = (TemplateFunction.of(each, network.dimension, slopes) for each, slopes in pairs)
+    return replace(network, rate_templates=tuple(functions))
 
 
 def term_size(e: sp.Expr, states: frozenset[sp.Symbol]) -> sp.Expr:

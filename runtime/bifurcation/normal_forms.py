@@ -23,7 +23,7 @@ def first_lyapunov_coefficient(problem: Equilibria, z: np.ndarray, vector: np.nd
     if not network.constant_mass:
         return float("nan")
     state, _, values = problem.split(z)
-    second, third = (each.at(values) for each in problem.higher)
+    second, third = (network.along(order).at(values) for order in (2, 3))
     network = network.at(values)
     jacobian, mass = network.jacobian(state), network.mass(state)
     mass = sparse.eye_array(len(state), format="csc") if mass is None else mass
