@@ -28,7 +28,7 @@ SHARED = {
     "progress": None,
     "parameters": None,
     "rng": None,
-    "precision": 1e-3,
+    "precision": None,
     "periods": 5000,
     "transient": None,
     "rtol": None,

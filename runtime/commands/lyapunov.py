@@ -23,7 +23,10 @@ def configure(parser: ArgumentParser) -> None:
     add_changed_scene(parser)
     parser.add_argument("--count", metavar="K", type=positive, help="number of largest exponents (default: all)")
     parser.add_argument(
-        "--precision", metavar="P", type=at_least_zero, help="standard error to be reached (default: 0.001)"
+        "--precision",
+        metavar="P",
+        type=at_least_zero,
+        help="standard error to be reached (default: 0.001 for a period of 2 pi)",
     )
     parser.add_argument(
         "--periods", metavar="T", type=periods, help="drive periods (else mean return times) at most (default: 5000)"

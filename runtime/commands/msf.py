@@ -62,7 +62,10 @@ def configure(parser: ArgumentParser) -> None:
         "parameters of the network",
     )
     parser.add_argument(
-        "--precision", metavar="P", type=at_least_zero, help="standard error to be reached (default: 0.001)"
+        "--precision",
+        metavar="P",
+        type=at_least_zero,
+        help="standard error to be reached (default: 0.001 for a period of 2 pi)",
     )
     parser.add_argument(
         "--periods", metavar="T", type=periods, help="drive periods (else units of 2 pi) at most (default: 5000)"

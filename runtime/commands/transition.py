@@ -28,7 +28,10 @@ def configure(parser: ArgumentParser) -> None:
         help="strengths, -sigma times an eigenvalue (default: 241 that reach all modes at the strengths of SCENE)",
     )
     parser.add_argument(
-        "--precision", metavar="P", type=at_least_zero, help="standard error to be reached (default: 0.001)"
+        "--precision",
+        metavar="P",
+        type=at_least_zero,
+        help="standard error to be reached (default: 0.001 for a period of 2 pi)",
     )
     parser.add_argument(
         "--periods", metavar="T", type=periods, help="drive periods (else mean return times) at most (default: 5000)"

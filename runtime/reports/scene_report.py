@@ -48,7 +48,7 @@ class Effort:
     """Numerical effort of a report."""
 
     strengths: int = 241  # number of strengths of the master stability function
-    precision: float = 1e-3  # as for `synchain.exponents`
+    precision: float | None = None  # as for `synchain.exponents`
     periods: float = 5000.0
     values: int | None = None  # largest number of values of each axis of the sweep; None for all values
 

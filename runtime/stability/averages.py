@@ -35,6 +35,8 @@ FIRST, PART = 128, 0.5
 first estimate."""
 ROUNDING = 100.0 * float(np.finfo(float).eps)
 """Largest rounding error of a sum, relative to the mean size of its terms (a choice)."""
+PRECISION = 1e-3
+"""Default standard error of an average, times the unit of time of the motion over 2 pi (a choice)."""
 TRANSIENT = 300.0
 """Periods before an average unless a call or the scene says otherwise (a choice)."""
 TOLERANCE_RATIO, TRIED = 4.0, 8
@@ -43,8 +45,9 @@ TOLERANCE_RATIO, TRIED = 4.0, 8
 
 KEYWORDS = {
     "average": """
-precision : float
-    Averaging stops if every standard error is below this value.
+precision : float, optional
+    Averaging stops if every standard error is below this value, per unit of non-dimensional time. By default 1e-3 times
+    2 pi over the unit of time of the motion, so that the length of an average does not depend on the unit of time.
 periods : float
     Longest average, in periods of the drive, or in mean return times of undriven motion; a whole number.
 transient : float, optional
@@ -101,6 +104,7 @@ class Averaging:
     seed: int  # seed of the random numbers that are drawn before the orbit begins
     execution: Execution  # threads, and where progress is reported
     of_scene: bool = False  # True if the transient is the scene's and counts in the scene's unit of time
+    of_motion: bool = False  # True if the precision counts in radians of the motion
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "precision", check_number("precision", self.precision, 0.0))
@@ -112,7 +116,7 @@ class Averaging:
     def for_scene(
         cls,
         scene: Scene,
-        precision: float,
+        precision: float | None,
         periods: float,
         transient: float | None,
         rng: int | np.random.Generator | None,
@@ -123,16 +127,18 @@ class Averaging:
         If `transient` or `rng` is None, use the scene's.
         """
         seed = check_seed("rng", chosen(scene, "rng", rng, 0))
-        length = chosen(scene, "transient", transient, None)
-        if transient is not None:
-            return cls(precision, periods, transient, seed, execution)
-        if not length:  # a scene without a transient records from its start on; an average needs the attractor
-            return cls(precision, periods, TRANSIENT, seed, execution)
-        return cls(precision, periods, _whole(scene, scene.period or 2.0 * math.pi), seed, execution, True)
+        length, of_scene = chosen(scene, "transient", transient, None), False
+        if transient is None:
+            # a scene without a transient records from its start on; an average needs the attractor
+            length, of_scene = (_whole(scene, scene.period or 2.0 * math.pi), True) if length else (TRANSIENT, False)
+        error, of_motion = (PRECISION, True) if precision is None else (precision, False)
+        return cls(error, periods, length, seed, execution, of_scene, of_motion)
 
     def in_units(self, scene: Scene, unit: float) -> Averaging:
-        """Return the averaging with the scene's transient converted into the unit of time of the motion."""
-        return replace(self, transient=_whole(scene, unit)) if self.of_scene else self
+        """Return the averaging of a motion with this unit of time: the transient in units, the precision per time."""
+        transient = _whole(scene, unit) if self.of_scene else self.transient
+        precision = self.precision * (2.0 * math.pi / unit) if self.of_motion else self.precision
+        return replace(self, transient=transient, precision=precision, of_scene=False, of_motion=False)
 
     def reporter(self, orbits: int = 1) -> Reporter:
         """Return a progress reporter for `orbits` transients and longest averages; its clock starts now."""

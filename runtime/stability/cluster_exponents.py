@@ -181,7 +181,7 @@ def cluster_exponents(
     scene: Scene,
     state: Clusters | Sequence[int],
     *,
-    precision: float = 1e-3,
+    precision: float | None = None,
     periods: float = 5000,
     transient: float | None = None,
     rtol: float | None = None,

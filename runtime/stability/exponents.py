@@ -320,7 +320,7 @@ def exponents(
     scene: Scene,
     alpha: Sequence[float] | Sequence[complex] | np.ndarray,
     *,
-    precision: float = 1e-3,
+    precision: float | None = None,
     periods: float = 5000,
     transient: float | None = None,
     starts: int = 4,

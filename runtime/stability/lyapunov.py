@@ -176,7 +176,7 @@ def lyapunov_spectrum(
     scene: Scene,
     *,
     count: int | None = None,
-    precision: float = 1e-3,
+    precision: float | None = None,
     periods: float = 5000,
     transient: float | None = None,
     rtol: float | None = None,

@@ -26,7 +26,7 @@ from ..engines.job import Start
 from ..results.certificate import ERRORS, Certificate
 from ..results.labels import States
 from ..stability.attractor import Motion
-from ..stability.averages import Averaging, errors_for
+from ..stability.averages import PRECISION, Averaging, errors_for
 from ..stability.exponents import along, coupled_cell
 from ..stability.orbits import OrbitProblem, unit_of_time, within
 from ..stability.transversal_modes import shared_orbits, transversal_modes
@@ -95,7 +95,7 @@ def certify(
     scene: Scene,
     states: np.ndarray | None = None,
     *,
-    precision: float = 2e-3,
+    precision: float | None = None,
     periods: float = 2000,
     workers: int | None = None,
 ) -> Certificate:
@@ -105,7 +105,8 @@ def certify(
     strength of links that vanish between equal states.
     """
     check_certifiable(scene)
-    averaging = Averaging(precision, periods, TRANSIENT, 0, Execution(workers, None, False))
+    error, execution = 2.0 * PRECISION if precision is None else precision, Execution(workers, None, False)
+    averaging = Averaging(error, periods, TRANSIENT, 0, execution, of_motion=precision is None)
     planner, cells = Planner(scene), np.arange(scene.cells)
     starts = planner.rows(cells).start
     layout = States.of(scene)
@@ -121,7 +122,9 @@ def certify(
         for members, extent, whole in _motions(problem, first, spread):
             chosen = members[np.linspace(0, len(members) - 1, min(STARTS, len(members))).astype(int)].tolist()
             with averaging.reporter() as reporter:
-                average = along(problem, first[chosen], group.strengths, averaging, reporter)
+                average = along(
+                    problem, first[chosen], group.strengths, averaging.in_units(cell, problem.unit), reporter
+                )
             # Of several similar attractors take the least stable, and of its modes the largest exponent.
             means = [average.by_start[list(rows)].mean(axis=0) for rows in average.groups]
             strength_of = group.place[members]

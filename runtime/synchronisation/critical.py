@@ -161,7 +161,7 @@ def critical(
     name: str,
     between: Sequence[float],
     *,
-    precision: float = 1e-3,
+    precision: float | None = None,
     periods: float = 5000,
     transient: float | None = None,
     starts: int = 4,

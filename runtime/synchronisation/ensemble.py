@@ -389,7 +389,7 @@ class Ensemble:
         unstable = np.ones(len(starts), dtype=bool)
         try:
             flat = self._flat(starts).replace(stop=None)
-            own = certify(flat, self.state[starts], precision=2e-3, periods=LONGEST, workers=self.execution.workers)
+            own = certify(flat, self.state[starts], periods=LONGEST, workers=self.execution.workers)
             unstable = own.exponent - 2.0 * own.stderr > 0.0
         except (ValueError, FloatingPointError):
             pass  # without exponents of their own, that of the scene's start counts

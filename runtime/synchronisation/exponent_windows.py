@@ -79,7 +79,7 @@ class ExponentWindows:
 
 
 def exponent_windows(
-    scene: Scene, alpha: np.ndarray, execution: Execution, precision: float, periods: float, seed: int
+    scene: Scene, alpha: np.ndarray, execution: Execution, precision: float | None, periods: float, seed: int
 ) -> ExponentWindows:
     """Compute the windows of a scene's network. Shapes: alpha (m,)."""
     try:

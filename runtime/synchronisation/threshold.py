@@ -178,7 +178,7 @@ def thresholds(
     sigma: Sequence[float] | np.ndarray | None = None,
     resolution: float | None = None,
     criterion: Criterion | None = None,
-    precision: float = 1e-3,
+    precision: float | None = None,
     periods: float = 5000,
     workers: int | None = None,
     executor: Executor | None = None,
@@ -249,7 +249,7 @@ def thresholds(
     grid = default_grid(spectrum) if sigma is None else row("sigma", sigma, 2, rising=True)
     resolution = None if resolution is None else check_positive("resolution", resolution)
     _check_steps(grid, resolution)
-    precision = check_number("precision", precision, 0.0)
+    precision = None if precision is None else check_number("precision", precision, 0.0)
     periods = check_whole("periods", check_positive("periods", periods))
     alpha = _probe_grid(grid, spectrum)
     stable = exponent_windows(

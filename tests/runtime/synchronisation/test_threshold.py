@@ -404,7 +404,7 @@ def test_the_effort_of_the_exponents_can_be_chosen(monkeypatch):
     scene = Scene(topology=chain(2))
     thresholds(scene, sigma=[0.1, 0.2])
     thresholds(scene, sigma=[0.1, 0.2], precision=0.1, periods=50, criterion=Criterion(rng=3))
-    assert asked == [(1e-3, 5000, 0), (0.1, 50, 3)]
+    assert asked == [(None, 5000, 0), (0.1, 50, 3)]
     for bad in ({"precision": "a"}, {"periods": 0}):
         with pytest.raises(ValueError, match=r"precision|periods"):
             thresholds(scene, sigma=[0.1, 0.2], **bad)
