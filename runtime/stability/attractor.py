@@ -73,6 +73,8 @@ class Attractor:
     periods: int = 1  # drive periods of one cycle; 1 without a drive
     # (3, m): logarithms of the factors by which the propagators of a cycle were divided
     logarithms: np.ndarray | float = field(default=0.0, repr=False)
+    # (components,): a state of the orbit after the search, from which an average may begin
+    state: np.ndarray | None = field(default=None, repr=False)
 
     @property
     def kind(self) -> str:
@@ -116,25 +118,24 @@ class Attractor:
         return error + ALIKE * np.abs(self.propagators[1]).max(axis=(-2, -1), initial=0.0)
 
 
-def find_attractor(problem: OrbitProblem, state: np.ndarray, patience: float) -> tuple[Attractor, np.ndarray]:
+def find_attractor(problem: OrbitProblem, state: np.ndarray, patience: float) -> Attractor:
     """Look for a fixed point, or a cycle of 1 … LONGEST drive periods, at a state (components,) after the transient.
 
-    Return the attractor, and the state at the end of the search, from which an average may begin.
     `patience`: units of time before a new search.
     """
     if problem.linear:
         timed = any(e.has(sp.Symbol("t", real=True)) for _, e in problem.variation.matrix)
-        return (_periodic if timed else _steady)(problem, state, Motion.LINEAR), state
+        return (_periodic if timed else _steady)(problem, state, Motion.LINEAR)
     closed = max(RETURN, 0.1 * problem.scene.rtol)
     if not problem.forced:
         # the speed of a held row is zero to rounding only
-        near = problem.rates.rounding(state, problem.unit) / closed if problem.variation.orbit.has_rows else 0.0
-        if rests(problem.rates, state, closed, np.maximum(problem.extent, near)):
-            return _steady(problem, state, Motion.FIXED_POINT), state
+        noise = problem.rates.rounding(state, problem.unit) if problem.variation.orbit.has_rows else 0.0
+        if rests(problem.rates, state, closed, problem.extent, noise):
+            return _steady(problem, state, Motion.FIXED_POINT)
         cycle = limit_cycle(problem, state, closed)
         if cycle is None:
-            return Attractor(Motion.APERIODIC, 0.0), state
-        return _periodic(problem, cycle.state, Motion.PERIODIC, unit=cycle.period), state
+            return Attractor(Motion.APERIODIC, 0.0, state=state)
+        return _periodic(problem, cycle.state, Motion.PERIODIC, unit=cycle.period)
     integrator = problem.integrator(state[None], problem.strengths[:1])
     for _ in range(ROUNDS):
         # compare the last state with the states one, two … periods before
@@ -148,11 +149,11 @@ def find_attractor(problem: OrbitProblem, state: np.ndarray, patience: float) ->
         rounding = problem.rates.rounding(last, LONGEST * problem.unit)
         periods = next((k + 1 for k, gap in enumerate(gaps) if np.all(gap <= closed * moves + rounding)), 0)
         if periods:
-            return _periodic(problem, last, Motion.PERIODIC, periods), last
+            return _periodic(problem, last, Motion.PERIODIC, periods)
         if not np.any(np.all(gaps <= CLOSE * np.maximum(moves, problem.extent), axis=1)):
             break
         integrator.advance(max(1, round(patience)) * problem.unit)
-    return Attractor(Motion.APERIODIC, 0.0), last
+    return Attractor(Motion.APERIODIC, 0.0, state=last)
 
 
 def _periodic(
@@ -167,7 +168,7 @@ def _periodic(
     *second, _ = cycle_propagators(problem, settled, periods, block)
     *looser, _ = cycle_propagators(problem, settled, periods, block, TOLERANCE_RATIO)
     propagators, logarithms = (np.concatenate(parts) for parts in zip(first, second, looser, strict=True))
-    return Attractor(motion, periods * unit, propagators, periods, logarithms)
+    return Attractor(motion, periods * unit, propagators, periods, logarithms, state)
 
 
 def cycle_propagators(
@@ -217,4 +218,4 @@ def _steady(problem: OrbitProblem, state: np.ndarray, motion: Motion) -> Attract
         along = [[sp.diff(e, d).xreplace(at) for d in deviations] for e in variation.events.jumps[-1][:p]]
         directions = orth(np.array(along, dtype=float))
         matrices = directions.T @ matrices @ directions
-    return Attractor(motion, 0.0, np.stack([matrices] * 3))
+    return Attractor(motion, 0.0, np.stack([matrices] * 3), state=state)

@@ -442,12 +442,10 @@ def along(
         problem, states, bounded = _settled(problem, states, averaging.transient, reporter)
 
     # exponents of fixed points and cycles follow from eigenvalues; the search for a cycle advances the state
-    attractors, reached = [], states.copy()
-    for row in range(starts):
-        attractor = Attractor(Motion.UNBOUNDED, 0.0)
-        if bounded[row]:
-            attractor, reached[row] = find_attractor(problem, states[row], averaging.transient)
-        attractors.append(attractor)
+    attractors = [
+        find_attractor(problem, state, averaging.transient) if inside else Attractor(Motion.UNBOUNDED, 0.0)
+        for state, inside in zip(states, bounded, strict=True)
+    ]
     by_start = np.full((starts, len(problem.strengths)), np.nan)
     error = np.full_like(by_start, np.nan)
     for row, attractor in enumerate(attractors):
@@ -458,7 +456,7 @@ def along(
     # exponents of other motion are mean growth rates, averaged for all starts together
     aperiodic = [row for row, attractor in enumerate(attractors) if attractor.motion is Motion.APERIODIC]
     if aperiodic:
-        begun = reached[aperiodic]
+        begun = np.array([attractors[row].state for row in aperiodic])
         march = March.begin(problem, begun, interpolation_for(problem, begun, averaging.periods))
         by_start[aperiodic], error[aperiodic], time = average(march, averaging, reporter)
         ends = [] if problem.forced or problem.variation.events else [*begun, *march.integrator.state]

@@ -24,6 +24,7 @@ from synchain.models.inputs.keywords import warn
 from synchain.models.mechanics.components import TIME, Edge, Node
 
 from .averages import ROUNDING
+from .slow_motion import CONTRACTED
 
 SHARE = 8
 """A path takes at least SHARE steps from one end of the extent of a component to the other (a choice)."""
@@ -59,10 +60,11 @@ CLEAR = 1 / 32
 ENOUGH = 12
 """Number of turns in the mean (a choice)."""
 
-APPROACH, OTHER, AFFORDED = 300, 4.0, 4_000_000
-"""While a component moves one way that changes the rates, the motion still approaches its attractor.  It runs for APPROACH
-turns, as many as the usual transient, then for twice as long each time. A later turn counts if it lasts OTHER times longer
-or shorter. After AFFORDED steps a warning says that the motion may be an approach (choices)."""
+APPROACH, OTHER, STEADY, AFFORDED = 300, 4.0, 1.25, 4_000_000
+"""While a component moves one way that changes the rates, or volumes have not shrunk since turns took STEADY times longer
+or shorter, the motion still approaches its attractor.  It runs for APPROACH turns, as many as the usual transient, then for
+twice as long each time. A later turn counts if it lasts OTHER times longer or shorter. After AFFORDED steps a warning says
+that the motion may be an approach (choices)."""
 
 REST = 1e-9
 """Rates count as zero if they are below their change over this part of the extent of the motion."""
@@ -249,12 +251,15 @@ def starts_near(state: np.ndarray, extent: np.ndarray, count: int, seed: int) ->
     return starts
 
 
-def rests(rates: RateFunctions, state: np.ndarray, closed: float, extent: np.ndarray) -> bool:
+def rests(
+    rates: RateFunctions, state: np.ndarray, closed: float, extent: np.ndarray, noise: np.ndarray | float = 0.0
+) -> bool:
     """Return True if the rates at a state count as zero.
 
-    A rate counts as zero if it is below the rounding of its terms, or below its change over `closed` times the extent.
+    A rate counts as zero if it is below the rounding of its terms, or below its change over `closed` times the extent,
+    or over the `noise` of the components.
     """
-    changes = np.abs(rates.slopes(state, extent)).sum(axis=1)
+    changes = np.abs(rates.slopes(state, np.maximum(extent, noise / closed))).sum(axis=1)
     here = np.abs(rates.values(state))
     return bool(np.all(here <= np.nan_to_num(closed * changes) + DIGITS * rates.sizes(state)))
 
@@ -277,8 +282,8 @@ def path(
         after = integrator.state[0, :count]
         lower, higher = np.minimum(low, after), np.maximum(high, after)
         moved, extent = SHARE * np.abs(after - before[0]), higher - lower
-        # a component that has moved by rounding alone limits no step
-        farthest = np.maximum(extent, SHARE * ROUNDING * np.abs(after))
+        # a component that has moved by rounding alone, such as the speed of a body in stick, limits no step
+        farthest = np.maximum(extent, SHARE * rates.rounding(after, shortest / FIRST))
         taken, velocity = integrator.steps - done, rates.values(after)
         turned = step * JUMP > last and _cosine(speed, velocity, extent) < TURNED
         if step > shortest and (taken > 2 * few + FINE or turned or np.any(moved > farthest)):
@@ -302,7 +307,7 @@ def _cosine(first: np.ndarray, second: np.ndarray, extent: np.ndarray) -> float:
 def shortest_time(rates: RateFunctions, state: np.ndarray) -> float:
     """Return a time in which a state hardly changes, from its rates and their slopes; 1 if all of them are zero."""
     size, speed = np.abs(state), np.abs(rates.values(state))
-    moving = (size > 0.0) & (speed > 0.0)
+    moving = (size > 0.0) & (speed > DIGITS * rates.sizes(state))
     times = [*(size[moving] / speed[moving])]
     if (fastest := _fastest(rates, state)) > 0.0:
         times.append(1.0 / fastest)
@@ -320,32 +325,45 @@ def _fastest(rates: RateFunctions, state: np.ndarray) -> float:
 def turns_of(integrator: OrbitIntegrator, rates: RateFunctions, hidden: int = 0, drifts: bool = True) -> Turns:
     """Measure the mean return time of an undriven orbit, or the slowest rate of the equilibrium that the orbit reaches.
 
-    The turns of a fast approach, such as those of Lorenz's system from x = 1e6, are not the unit of time.
+    The turns of a fast approach, such as those of Lorenz's system from x = 1e6, are not the unit of time: measure again
+    until no component moves one way, and volumes have shrunk while the time of a turn did not change.
     """
-    turns, path_states = _turns_of_path(integrator, rates, hidden, drifts)
-    trend, before, length, begun = _trend(path_states), path_states[-1], 0.0, integrator.steps
-    while trend.any():
+    turns, path_states, time = _turns_of_path(integrator, rates, hidden, drifts)
+    trend, before, length, begun, last = _trend(path_states), path_states[-1], 0.0, integrator.steps, turns
+    shrinks = _contraction(rates, path_states, turns.extent)
+    shrunk = shrinks * time
+    while trend.any() or (shrunk < CONTRACTED and shrinks * time > FLAT):
         length = max(2.0 * length, APPROACH * turns.time)
         if integrator.steps - begun > AFFORDED:
-            warn(
-                f"found a component that moves one way over {length / turns.time:.1g} turns of {turns.time:.3g} units of time; expected "
-                "motion on an attractor, the unit of time may be that of an approach; start nearer to the attractor"
-            )
+            if trend.any():  # `warn_of_slow_motion` warns if volumes have not shrunk
+                warn(
+                    f"found a component that moves one way over {length / turns.time:.1g} turns of {turns.time:.3g} units of time; "
+                    "expected motion on an attractor, the unit of time may be that of an approach; start nearer to the attractor"
+                )
             break
         try:
             integrator.advance(length)
         except FloatingPointError:  # the transient raises the error for an unbounded motion
             break
-        later, path_states = _turns_of_path(integrator, rates, hidden, drifts)
+        later, path_states, time = _turns_of_path(integrator, rates, hidden, drifts)
+        shrinks = _contraction(rates, path_states, later.extent)
+        same = last.time / STEADY < later.time < STEADY * last.time
+        shrunk, last = shrunk + shrinks * (length + time) if same else 0.0, later
         if not turns.time / OTHER < later.time < OTHER * turns.time:
             turns = later
         # the same components go on the same way, and the rates depend on them
         move = path_states[-1] - before
         trend = np.where((_trend(path_states) == trend) & (np.sign(path_states[0] - before) == trend), trend, 0.0)
-        if rates.ignore(before, np.where(trend, move, 0.0)):
-            break
+        if trend.any() and rates.ignore(before, np.where(trend, move, 0.0)):
+            trend = np.zeros_like(trend)
         before = path_states[-1]
     return turns
+
+
+def _contraction(rates: RateFunctions, states: np.ndarray, extent: np.ndarray) -> float:
+    """Return the mean rate at which volumes shrink in each dimension at states (k, p); 0 for one state."""
+    looked = states[:: max(1, len(states) // OFTEN)] if len(states) > 1 else states[:0]
+    return float(np.mean([rates.contraction(state, extent) for state in looked] or 0.0))
 
 
 def _trend(states: np.ndarray) -> np.ndarray:
@@ -356,8 +374,8 @@ def _trend(states: np.ndarray) -> np.ndarray:
 
 def _turns_of_path(
     integrator: OrbitIntegrator, rates: RateFunctions, hidden: int, drifts: bool
-) -> tuple[Turns, np.ndarray]:
-    """Return the unit of time and the extent of a path, and its later states (k, p) if it turns, else its last one.
+) -> tuple[Turns, np.ndarray, float]:
+    """Return unit and extent of a path, its later states (k, p) if it turns, else its last one, and its length of time.
 
     A motion with constant rates, such as that of locked phases, counts as an equilibrium that drifts. A turn of a
     component lasts from one maximum to the next; between them the component falls and rises by at least CLEAR times its
@@ -368,9 +386,12 @@ def _turns_of_path(
     start = integrator.state[0, :count].copy()
     times, states, velocities, time = [0.0], [start], [rates.values(start)], 0.0
     extent, closed = np.zeros_like(start), NOISE * float(integrator.control[Control.RTOL])
-    if not rests(rates, start, REST, extent):
+    shortest = shortest_time(rates, start)
+    # motion below this size is rounding, such as the speed of a body in stick
+    noise = rates.rounding(start, shortest / FIRST)
+    if not rests(rates, start, REST, extent, noise):
         try:
-            steps = path(integrator, rates, shortest_time(rates, start), hidden)
+            steps = path(integrator, rates, shortest, hidden)
             for k, (_, step, extent, velocity) in enumerate(steps, 1):
                 time += step
                 times.append(time)
@@ -378,17 +399,18 @@ def _turns_of_path(
                 velocities.append(velocity)
                 if not np.isfinite(time) or k == SAMPLES:
                     break
-                still = np.all(np.abs(states[-1] - states[-2]) <= STILL * extent)
-                if still and k > LOOKED and rests(rates, states[-1], REST, extent):
+                noise = rates.rounding(states[-1], shortest / FIRST)
+                still = np.all(np.abs(states[-1] - states[-2]) <= STILL * extent + noise)
+                if still and k > LOOKED and rests(rates, states[-1], REST, extent, noise):
                     break
-                if k % LOOKED == 0 and _mean_turn(np.array(times[k // 4 :]), np.array(states[k // 4 :]), ENOUGH):
+                if k % LOOKED == 0 and _mean_turn(np.array(times[k // 4 :]), np.array(states[k // 4 :]), noise, ENOUGH):
                     break
                 if drifts and k % OFTEN == 0 and _drift(rates, times, states, velocities, extent, closed) is not None:
                     break
         except FloatingPointError:  # the transient raises the error for an unbounded motion
             pass
     # subtract an even drift, such as that of locked phases: only the approach to the drift counts as motion
-    at_rest = rests(rates, states[-1], REST, extent)
+    at_rest = rests(rates, states[-1], REST, extent, noise)
     drift = _drift(rates, times, states, velocities, extent, closed) if drifts else None
     even = np.zeros_like(start) if at_rest else drift
     early, path_states = len(times) // 4, np.array(states)
@@ -397,11 +419,11 @@ def _turns_of_path(
     late = path_states[early:]
     extent = extent_of(path_states, late[len(late) // 2 :])
     unit, label, turning = time or 2.0 * np.pi, "time in which nothing returns" if time else "nothing moves", late[-1:]
-    if turn := _mean_turn(np.array(times[early:]), late, 1):
+    if turn := _mean_turn(np.array(times[early:]), late, noise, 1):
         unit, label, turning = turn, "mean return time", late
     elif even is not None and (slow := _slowest(rates, states[-1], extent)):
         unit, label = 2.0 * np.pi / slow, "turn of the slowest rate"
-    return Turns(unit, above(extent, rates.rounding(states[-1], unit)), label), turning
+    return Turns(unit, above(extent, rates.rounding(states[-1], unit)), label), turning, time
 
 
 def _drift(
@@ -433,12 +455,15 @@ def _drift(
     return last if fastest == 0.0 or times[-1] * fastest >= 1.0 else None
 
 
-def _mean_turn(times: np.ndarray, states: np.ndarray, fewest: int) -> float:
-    """Return the mean time between maxima of the component with the most maxima; 0 for fewer than `fewest` turns."""
+def _mean_turn(times: np.ndarray, states: np.ndarray, noise: np.ndarray, fewest: int) -> float:
+    """Return the mean time between maxima of the component with the most maxima; 0 for fewer than `fewest` turns.
+
+    Components that move by less than the `noise` (p,) are at rest.
+    """
     best, mean = fewest, 0.0
-    for x in states.T:
+    for x, least in zip(states.T, noise, strict=True):
         extent = np.ptp(x)
-        if not extent > DIGITS * np.abs(x).max():
+        if not extent > max(DIGITS * np.abs(x).max(), least):
             continue
         tops = _tops(x, CLEAR * extent)
         if len(tops) > best:

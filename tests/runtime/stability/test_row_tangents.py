@@ -256,3 +256,21 @@ def test_derivatives_of_a_network_through_events(node, coupling, start: list[flo
         assert image.columns[0][:, k] == pytest.approx(difference(name, np.zeros(size)), abs=1e-7)
     for k, direction in enumerate(np.eye(size)):
         assert image.propagators[0][:, k] == pytest.approx(difference(None, direction), abs=1e-7)
+
+
+@pytest.mark.parametrize("damping", [R(1, 4), 3])
+@pytest.mark.parametrize("inertia", [0, R(1, 3)])
+def test_a_body_in_stick_beside_a_coordinate_that_decays(damping, inertia) -> None:
+    """x is held by 3/5, th decays: one neutral direction. The speed of x is a rounding error, and no unit of time."""
+    node = sc.Lagrangian(
+        V**2 / 2 + OM**2 / 2 + inertia * V * OM,
+        X**2 / 2 + TH**2 / 2 + X * TH / 10,
+        {X: R(3, 5) * sc.friction(-V), TH: -damping * OM},
+        coordinates={X: V, TH: OM},
+        friction=sc.friction_law("sign(w)"),
+        contact="set-valued",
+    )
+    found = sc.exponents(ring(node, "spring on x", x=0.3, v=0.0, th=0.5, om=0.0), [0.0, 0.3], starts=1)
+    assert found.motions == ("fixed point",)
+    assert found.exponent == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert 0.5 < float(found.unit.split(", ")[1].split()[0]) < 30.0

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from synchain import Field, Scene, exponents, msf, plane
+from synchain import Field, Scene, cluster_exponents, exponents, lyapunov_spectrum, msf, plane
 from synchain.graphs import chain
 from synchain.results import MSF, Exponents
 from synchain.runtime.stability.attractor import Attractor, Motion
@@ -146,3 +146,42 @@ def test_starts_on_one_cycle_are_one_motion_where_an_exponent_dips() -> None:
     far = Attractor(Motion.PERIODIC, 1.0, np.tile([[0.0, 1.0], [1e-2, 0.0]], (3, 1, 1, 1)))
     by_start[1] = far.exponents()[0]
     assert group_by_attractor((first, far), by_start, np.zeros((2, 1))) == ((0,), (1,))
+
+
+LORENZ = Field(
+    {"x": "k*10*(y - x)", "y": "k*(28*x - y - x*z)", "z": "k*(x*y - 8*z/3)"},
+    parameters={"k": 1.0},
+    initial={"x": 1.0, "z": 20.0},
+)
+
+
+def averages_of_lorenz(k: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Exponents over k, their errors over k, and the lengths of averages times k."""
+    scene = Scene(LORENZ, "x->x", chain(2), parameters={"k": k, "sigma": 10.0 * k})
+    modes = exponents(scene, k * np.array([0.0, 20.0]), starts=1, periods=20_000)
+    cluster = cluster_exponents(scene, [0, 0], periods=20_000)
+    spectrum = lyapunov_spectrum(Scene(LORENZ, None, parameters={"k": k}), periods=20_000)
+    parts = (modes, cluster, spectrum)
+    value, error = (np.concatenate([getattr(part, name) for part in parts]) for name in ("exponent", "stderr"))
+    return value / k, error / k, k * np.array([part.time for part in parts])
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("k", [1e-6, 1e6])
+def test_averages_of_chaos_end_alike_in_any_unit_of_time(k: float) -> None:
+    """Averages end by the default precision long before 20 000 turns of 0.75/k units."""
+    (value, error, length), (scaled, error_scaled, length_scaled) = averages_of_lorenz(1.0), averages_of_lorenz(k)
+    assert np.all(np.abs(scaled - value) <= 4.0 * np.hypot(error, error_scaled))
+    assert np.all(np.abs(np.log(length_scaled / length)) < np.log(4.0))
+    assert length.max() < 0.5 * 20_000 * 0.75
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("far", [1e4, 1e6])
+def test_the_unit_of_time_is_that_of_the_attractor(far: float) -> None:
+    """Far outside, Lorenz's system turns `far` times faster, and no component moves one way."""
+    scene = Scene(LORENZ, "x->x", chain(2), initial={"x": far, "y": 0.5 * far, "z": 20.0})
+    result = exponents(scene, [0.0, 20.0], starts=1)
+    assert np.all(np.abs(result.exponent - [0.9056, -0.787]) <= 4.0 * result.stderr)
+    assert np.all(result.stderr < 0.02)
+    assert 0.5 < float(result.unit.split(", ")[1].split()[0]) < 1.0
