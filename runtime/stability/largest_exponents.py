@@ -12,9 +12,15 @@ from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
 from ..cells.run_keywords import with_numbers
+from .attractor import Attractor, Motion
 from .averages import Averaging
 from .exponents import along, orbits_of
+from .motion import Spread
+from .orbits import OrbitProblem
 from .transversal_modes import SharedOrbit, still_strengths
+
+SAMPLES, UNITS = 256, 32
+"""Number of samples of a motion, over one cycle or over UNITS units of time (choices)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +31,7 @@ class LargestExponents:
     stderr: np.ndarray  # (points,): its standard error
     mode: np.ndarray  # (points,): index of the mode with the largest exponent
     kinds: np.ndarray  # (points, starts): kind of motion of each start
+    spreads: tuple[Spread, ...]  # mean and extent of the motion of the scene's own start on each orbit
     time: float  # length of the longest average
 
 
@@ -35,6 +42,7 @@ def largest_exponents(
     points = sum(len(orbit.cells) for orbit in orbits)
     exponent, stderr, worst = np.empty(points), np.empty(points), np.empty(points, dtype=int)
     kinds, longest = np.empty((points, check_integer("starts", starts, 1)), dtype=object), 0.0
+    spreads: list[Spread] = []
     with averaging.reporter(len(orbits)) as reporter:
         for done, orbit in enumerate(orbits, start=1):
             problem, states = orbits_of(with_numbers(cell, orbit.parameters), orbit.strengths, starts, averaging)
@@ -45,9 +53,23 @@ def largest_exponents(
             exponent[orbit.cells] = table[points_of_orbit, largest]
             stderr[orbit.cells] = found.stderr[orbit.place][points_of_orbit, largest]
             kinds[orbit.cells] = [attractor.kind for attractor in found.attractors]
+            spreads.append(_spread(problem, found.attractors[0]))
             longest = max(longest, found.time)
             reporter.advance(max(reporter.total * done / len(orbits) - reporter.done, 0.0))
-    return LargestExponents(exponent, stderr, worst, kinds.astype(str), longest)
+    return LargestExponents(exponent, stderr, worst, kinds.astype(str), tuple(spreads), longest)
+
+
+def _spread(problem: OrbitProblem, attractor: Attractor) -> Spread:
+    """Return the mean and the extent (p,) of the motion on an attractor; 0 at rest, and for angles, which may turn."""
+    count = problem.variation.orbit.continuous_dimension
+    states = np.zeros((SAMPLES, count))
+    if attractor.state is not None and attractor.motion not in (Motion.LINEAR, Motion.FIXED_POINT):
+        integrator = problem.integrator(attractor.state[None], problem.strengths[:1])
+        for k in range(SAMPLES):
+            integrator.advance((attractor.cycle or UNITS * problem.unit) / SAMPLES)
+            states[k] = integrator.state[0, :count]
+        states[:, np.array([period is not None for period in problem.rates.periods[:count]])] = 0.0
+    return Spread.of(states)
 
 
 def check_parameters(what: str, cell: Scene, values: Mapping[str, Iterable[float]]) -> None:

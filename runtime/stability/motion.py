@@ -83,6 +83,10 @@ extent."""
 FLAT = 1e-6
 """Difference quotients do not resolve rates of an equilibrium below this part of the fastest rate."""
 
+ALIKE = 0.25
+"""Two motions are alike if their means differ by less than ALIKE times the larger extent, and their extents by less than
+twice as much (a choice)."""
+
 REACH = 0.4
 """Largest distance of a further start in the first component, relative to the extent of the motion (a choice)."""
 
@@ -143,6 +147,25 @@ class RateFunctions(NamedTuple):
         """Return the rate at which volumes shrink in each dimension at a state; NaN if it cannot be computed."""
         scale = np.where(extent > 0.0, extent, np.where(state != 0.0, np.abs(state), 1.0))
         return -float(np.trace(self.slopes(state, scale) / scale)) / len(state)
+
+
+class Spread(NamedTuple):
+    """Mean and extent (…, p) of each component of a motion."""
+
+    mean: np.ndarray
+    extent: np.ndarray
+
+    @classmethod
+    def of(cls, states: np.ndarray) -> Spread:
+        """Return mean and extent of states (k, …, p)."""
+        return cls(np.mean(states, axis=0), np.ptp(states, axis=0))
+
+    def like(self, other: Spread, least: np.ndarray | float = 0.0) -> np.ndarray:
+        """Return where two motions (…) are alike; means that differ by less than `least` (p,) are alike."""
+        allowed = ALIKE * np.maximum(self.extent, other.extent) + least
+        apart = np.abs(self.mean - other.mean) > allowed
+        wider = np.abs(self.extent - other.extent) > 2.0 * allowed
+        return np.asarray(~np.any(apart | wider, axis=-1))
 
 
 class Turns(NamedTuple):

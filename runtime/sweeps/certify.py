@@ -28,6 +28,7 @@ from ..results.labels import States
 from ..stability.attractor import Motion
 from ..stability.averages import PRECISION, Averaging, errors_for
 from ..stability.exponents import along, coupled_cell
+from ..stability.motion import Spread
 from ..stability.orbits import OrbitProblem, unit_of_time, within
 from ..stability.transversal_modes import shared_orbits, transversal_modes
 from ..support.execution import Execution
@@ -48,10 +49,8 @@ LOOKED, STARTS = 64, 4
 exponents
 are averaged. Choices."""
 
-ALIKE, CLOSE = 0.25, 1e-3
-"""Two motions count as one if their means differ by less than ALIKE times the larger extent of both, plus CLOSE times
-the
-extent of all motions of a group (choices)."""
+CLOSE = 1e-3
+"""Two motions count as one if their means differ by less than CLOSE times the extent of all motions of a group (a choice)."""
 
 
 @dataclass
@@ -153,16 +152,14 @@ def _motions(
     for _ in range(LOOKED):
         integrator.advance(step)
         path.append(integrator.state)
-    mean, extent = np.mean(path, axis=0), np.ptp(path, axis=0)
+    spread = Spread.of(np.array(path))
     whole = np.ptp(np.concatenate([*path, starts]), axis=0)
     # Group the remaining rows with the first of them.
-    remaining = np.arange(len(mean))
+    remaining = np.arange(len(states))
     while len(remaining):
         first = remaining[0]
-        allowed = ALIKE * np.maximum(extent[first], extent[remaining]) + CLOSE * whole
-        apart = np.abs(mean[remaining] - mean[first]) > allowed
-        wider = np.abs(extent[remaining] - extent[first]) > 2.0 * allowed
-        alike = ~np.any(apart | wider, axis=1) | problem.linear
+        one, others = (Spread(*(values[rows] for values in spread)) for rows in (first, remaining))
+        alike = others.like(one, CLOSE * whole) | problem.linear
         rows = remaining[alike]
         # The samples of a forced motion are at one phase of the drive: add samples within a period.
         samples = within(problem, states[rows]) if problem.forced else np.array(path)[:, rows]

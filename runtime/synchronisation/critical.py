@@ -25,6 +25,7 @@ from ..results.labelled import Labelled, dataset, scene_text
 from ..stability.averages import ROUNDING, Averaging, document_keywords
 from ..stability.exponents import RTOL, coupled_cell, with_partner
 from ..stability.largest_exponents import check_parameters, largest_exponents
+from ..stability.motion import Spread
 from ..stability.transversal_modes import shared_orbits, transversal_modes
 from ..support.arrays import row
 from ..support.error_text import range_text, with_error
@@ -44,6 +45,9 @@ APART, LEAST = 8.0, 1e-3
 """The slope at a zero is measured over APART errors of the zero on either side, but at least over the part LEAST of the
 range that is searched."""
 
+CLOSER = 4.0
+"""Ratio of successive distances from a jump at which the signs of averages are tested (a choice)."""
+
 FIRST, MARGIN = 0.02, 3.0
 """First bracket around a predicted zero: the larger of the part FIRST of the range, and MARGIN times the last error of
 the prediction or of the zero."""
@@ -57,6 +61,7 @@ class Evaluation(NamedTuple):
     error: float  # standard error of the exponent
     mode: int  # index of the mode with this exponent
     kind: str  # kind of motion of the scene's own start
+    spread: Spread = Spread(np.zeros(0), np.zeros(0))  # mean and extent of this motion
 
     @property
     def sign(self) -> int:
@@ -93,7 +98,7 @@ class Critical(Labelled):
     motions : tuple of str
         Kind of synchronous motion at each value.
     remarks : tuple of str
-        Where the exponent jumps, or why there is no value; else empty.
+        Where the exponent or the synchronous motion jumps, or why there is no value; else empty.
     evaluations : ndarray, shape (k, 4)
         All points at which exponents were computed: second parameter (NaN without one), parameter, exponent, and
         standard error.
@@ -197,7 +202,8 @@ def critical(
     -------
     Critical
         Its errors are those of the exponents, divided by the slope. On periodic orbits they are errors of the steps,
-        which `rtol` reduces; on other motion `precision` and `periods` determine them.
+        which `rtol` reduces; on other motion `precision` and `periods` determine them. Where the synchronous motion
+        itself changes at the zero, the error is the width of the range in which it changes.
 
     Raises
     ------
@@ -259,9 +265,8 @@ def critical(
         def measure(x: float, second: float = second) -> Evaluation:
             columns = {name: np.array([x]), **({along: np.array([second])} if along else {})}
             found = largest_exponents(cell, list(shared_orbits(cell, columns)), starts, averaging)
-            evaluation = Evaluation(
-                x, float(found.exponent[0]), float(found.stderr[0]), int(found.mode[0]), str(found.kinds[0, 0])
-            )
+            exponent, stderr = float(found.exponent[0]), float(found.stderr[0])
+            evaluation = Evaluation(x, exponent, stderr, int(found.mode[0]), str(found.kinds[0, 0]), found.spreads[0])
             evaluations.append((second, evaluation))
             return evaluation
 
@@ -299,7 +304,7 @@ def critical(
 
 def _zero(measure: Callable[[float], Evaluation], low: Evaluation, high: Evaluation) -> Zero:
     """Find the zero between two evaluations with certain and different signs."""
-    ends, fall = (low.x, high.x), abs(high.y - low.y)
+    ends, fall = (low, high), abs(high.y - low.y)
     scale = ROUNDING * max(abs(low.y), abs(high.y)) if math.isfinite(low.y * high.y) else 0.0
     weights = [low.y, high.y]
     last_side, widths = 0, 0.0
@@ -328,7 +333,17 @@ def _zero(measure: Callable[[float], Evaluation], low: Evaluation, high: Evaluat
     remark = f"the exponent jumps from {with_error(low.y, low.error)} to {with_error(high.y, high.error)}"
     stable = low if low.sign < 0 else high
     slope = math.copysign(math.inf, high.sign)
-    return Zero(0.5 * (low.x + high.x), 0.5 * (high.x - low.x), slope, stable.mode, stable.kind, remark)
+    value, error = 0.5 * (low.x + high.x), 0.5 * (high.x - low.x)
+    # averages may cover both motions, so that signs are random about the jump: approach it once more from outside
+    if CERTAIN * max(low.error, high.error) > LEAST * abs(high.y - low.y):
+        reach = ends[1].x - ends[0].x
+        while reach > LEAST * (ends[1].x - ends[0].x):
+            sides = measure(max(value - reach / CLOSER, ends[0].x)), measure(min(value + reach / CLOSER, ends[1].x))
+            if (sides[0].sign, sides[1].sign) != (low.sign, high.sign):
+                break
+            reach /= CLOSER
+        error = CLOSER * reach  # both signs may be right by chance
+    return Zero(value, error, slope, stable.mode, stable.kind, remark)
 
 
 def _at_zero(
@@ -336,13 +351,13 @@ def _at_zero(
     low: Evaluation,
     point: Evaluation,
     high: Evaluation,
-    ends: tuple[float, float],
+    ends: tuple[Evaluation, Evaluation],
 ) -> Zero:
     """Return the zero near a point whose exponent is zero within its error.
 
     `low` and `high` bracket the point; `ends` bound the values at which exponents are computed.
     """
-    first, last = ends
+    first, last = ends[0].x, ends[1].x
     slope = (high.y - low.y) / (high.x - low.x)
     reach = max(APART * point.error / abs(slope) if math.isfinite(slope) else 0.0, LEAST * (last - first))
     near = [point]
@@ -362,10 +377,15 @@ def _at_zero(
     averaged = CERTAIN * point.error > LEAST * abs(slope) * (last - first)
     offset = level if averaged else point.y
     spread = math.hypot(float(error.max()), float(np.abs(y - level - slope * (x - point.x)).max()) if averaged else 0.0)
-    rounding = np.spacing(abs(point.x))
-    return Zero(
-        float(point.x - offset / slope), spread / abs(slope) + rounding, float(slope), point.mode, point.kind, ""
-    )
+    value, uncertainty = float(point.x - offset / slope), spread / abs(slope) + np.spacing(abs(point.x))
+    # the exponent may pass zero by a jump of the motion, which lies anywhere between both sides
+    remark = ""
+    if not sides[0].spread.like(sides[1].spread):
+        uncertainty = max(uncertainty, float(x.max() - x.min()))
+        remark = f"the synchronous motion changes between {sides[0].x:.6g} and {sides[1].x:.6g}"
+    elif others := [f"{end.x:.6g}" for end in ends if not end.spread.like(point.spread)]:
+        remark = f"the synchronous motion differs at {' and '.join(others)}: if it jumps, other starts may pass zero elsewhere"
+    return Zero(value, uncertainty, float(slope), point.mode, point.kind, remark)
 
 
 def _next_zero(

@@ -8,6 +8,11 @@ import pytest
 
 from synchain import Field, Rates, Scene, critical, run
 from synchain.graphs import chain, ring
+from synchain.runtime.stability.averages import Averaging
+from synchain.runtime.stability.largest_exponents import largest_exponents
+from synchain.runtime.stability.motion import Spread
+from synchain.runtime.stability.transversal_modes import shared_orbits
+from synchain.runtime.support.execution import Execution
 from synchain.runtime.synchronisation.critical import Evaluation, _zero
 
 WINDOW = Field({"x": "x + y", "y": "-1.5*x + 0.5*y"})
@@ -113,6 +118,54 @@ def test_a_jump_of_the_exponent_is_no_zero():
     zero = _zero(measure, measure(0.0), measure(1.0))
     assert abs(zero.value - np.pi / 10) <= zero.error + 1e-15 < 1e-12
     assert zero.remark.startswith("the exponent jumps from -0.2000000 ± 1.0e-06 to 0.1000000")
+
+
+ONE, OTHER = Spread(np.array([0.0]), np.array([1.0])), Spread(np.array([2.0]), np.array([1.0]))
+"""Two motions with the same extent about other means."""
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_zero_where_the_motion_changes_may_lie_anywhere_in_the_change(seed):
+    """Exponents 0.1 and -0.1 of two motions, and averages over both within 1e-3 of pi/10."""
+    random = np.random.default_rng(seed)
+
+    def measure(x):
+        mixed = 1e-3 * random.uniform(-1.0, 1.0)
+        return Evaluation(
+            x,
+            100.0 * np.clip(np.pi / 10 + mixed - x, -1e-3, 1e-3),
+            2e-3,
+            0,
+            "aperiodic",
+            ONE if x < np.pi / 10 else OTHER,
+        )
+
+    zero = _zero(measure, measure(0.0), measure(1.0))
+    assert abs(zero.value - np.pi / 10) <= 2e-3 <= zero.error <= 0.02
+    assert zero.remark.startswith(("the synchronous motion changes between 0.31", "the exponent jumps from "))
+
+
+def test_another_motion_at_an_end_of_the_range_is_said():
+    def measure(x):
+        return Evaluation(x, 0.3 - x, 1e-9, 0, "periodic", ONE if x < 0.6 else OTHER)
+
+    zero = _zero(measure, measure(0.0), measure(1.0))
+    assert zero.error < 1e-8
+    assert zero.remark == "the synchronous motion differs at 1: if it jumps, other starts may pass zero elsewhere"
+
+
+def test_motions_in_the_two_wells_of_a_spring_differ():
+    """x'' = x - x**3 - v/4 + 0.1 cos t about -1 and 1; sigma changes no motion, the drive's strength hardly."""
+    node = Field({"x": "v", "v": "x - x**3 - 0.25*v + f*cos(t)"}, parameters={"f": 0.1})
+    spreads = []
+    for x, f in ((-1.0, 0.1), (1.0, 0.1), (1.0, 0.11)):
+        scene = Scene(node, "v->v", chain(2), initial={"x": x, "v": 0.0}, parameters={"f": f, "sigma": 0.1}, rtol=1e-6)
+        (orbit,) = shared_orbits(scene, {"sigma": np.array([0.1])})
+        averaging = Averaging(1e-3, 128, 100, 0, Execution(1, show_progress=False))
+        spreads.append(largest_exponents(scene, [orbit], 1, averaging).spreads[0])
+    left, right, stronger = spreads
+    assert left.mean[0] < 0.0 < right.mean[0]
+    assert (bool(left.like(right)), bool(right.like(stronger))) == (False, True)
 
 
 def test_an_infinite_exponent_is_bisected():
