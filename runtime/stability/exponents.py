@@ -22,6 +22,7 @@ import xarray as xr
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.inputs.checks import check_integer
 from synchain.models.inputs.keywords import warn
+from synchain.models.scenes.open_stops import without_open_stops
 from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.run_keywords import ONE_CELL, ORBITS, Given, chosen
@@ -401,6 +402,9 @@ def transversal(
     """Compute the exponents at strengths (m,) or (m, layers), for the arguments of a public function."""
     reporter = averaging.reporter()
     cell = coupled_cell(given, scene, chosen(scene, "rtol", rtol, RTOL))
+    if scene.equations.joined and not cell.equations.joined:
+        name = given.function.__name__
+        warn(f"{name}: left out the stops in links, which are open between equal oscillators", UserWarning)
     problem, states = orbits_of(cell, strengths, starts, averaging)
     averaging = averaging.in_units(cell, problem.unit)
     reporter.total = averaging.length
@@ -512,7 +516,7 @@ def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
     The scene may sweep strengths that do not change the synchronous orbit.
     """
     given.expect_one_cell(scene, unused_axes(scene))
-    return given.scene(with_partner(scene), rtol=rtol)
+    return without_open_stops(given.scene(with_partner(scene), rtol=rtol))
 
 
 def with_partner(scene: Scene) -> Scene:
@@ -527,7 +531,7 @@ def with_partner(scene: Scene) -> Scene:
         coupled = pair_of(scene, **ONE_CELL)
     except ValueError:
         return scene.replace(**ONE_CELL)
-    expect_vanishing("a lone oscillator gets a partner", coupled.equations)
+    expect_vanishing("a lone oscillator gets a partner", without_open_stops(coupled).equations)
     return coupled
 
 

@@ -30,6 +30,7 @@ from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.inputs.display import HasPlot
 from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.names import expect_free
+from synchain.models.scenes.open_stops import without_open_stops
 from synchain.models.scenes.scene import Scene, check_scene
 from synchain.models.sweeps.axis import Axis
 
@@ -571,7 +572,7 @@ def on_a_line(
     averaging: Averaging,
 ) -> MSF:
     """Compute a master stability function, for the arguments of a public function."""
-    expect_vanishing(given.function.__name__, check_scene(scene).equations)
+    expect_vanishing(given.function.__name__, without_open_stops(_with_parameters(given, check_scene(scene))).equations)
     line = row(
         "alpha",
         default_strengths(_with_parameters(given, scene, scene.axes)) if alpha is None else alpha,
@@ -682,7 +683,7 @@ def plane(
             "write parameters={'beta': …} for the parameter",
             UserWarning,
         )
-    expect_vanishing("plane", check_scene(scene).equations)
+    expect_vanishing("plane", without_open_stops(_with_parameters(fixed, check_scene(scene))).equations)
     across, up = axes.values()
     heights, index = np.unique(np.abs(up), return_inverse=True)
     half_plane = transversal(fixed, scene, (across[:, None] + 1j * heights).reshape(-1), starts, rtol, averaging)

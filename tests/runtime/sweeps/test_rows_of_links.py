@@ -266,7 +266,7 @@ REFUSED = {
     "closed": (lambda: sc.msf(scene("harmonic", CRADLE, sc.graphs.ring(3), 1.0, "auto"), [0.1]), "gap 0 between equal oscillators; expected a positive gap"),
     "open": (
         lambda: sc.msf(scene("harmonic", sc.Potential(0, events=[sc.Stop("x_j - x_i + 1")]), sc.graphs.ring(3), 1.0, "auto"), [0.1]),
-        "if the gap 1 is positive; expected the coupling without them",
+        "found stops alone, which are open between equal oscillators; expected an energy",
     ),
     "export": (lambda: sc.export.to_c(scene(BLOCK, CRADLE, sc.graphs.chain(2), 1.0, "auto").equations), "found contacts or stops in links"),
 }  # fmt: skip
@@ -277,6 +277,34 @@ def test_what_is_refused(case: str) -> None:
     action, words = REFUSED[case]
     with pytest.raises((ValueError, TypeError), match=words):
         action()
+
+
+A, K = sp.symbols("a k")
+BALL = sc.Lagrangian(V**2 / 2, X**4 / 4, {X: sp.cos(T) - V / 5}, coordinates={X: V})
+BUFFER = sc.Potential(
+    "k*W*(x_i - x_j)**2/2", {"k": 0.3, "e": 0.9, "a": 1}, events=[sc.Stop("x_j - x_i + a", restitution="e")]
+)
+CLOSED = r"found stops in links, which are open .* if the gap a is positive"
+SPRING = sc.Potential("k*W*(x_i - x_j)**2/2", {"k": 0.3})
+
+
+def test_stops_that_are_open_in_synchrony_change_no_exponent() -> None:
+    """The gap between equal oscillators is a; the exponents are those of the springs, to the last bit."""
+    settings = {"precision": 1.0, "periods": 60, "transient": 20, "show_progress": False, "starts": 1}
+    buffers, springs = (scene(BALL, link, sc.graphs.ring(3), 1.0, "auto") for link in (BUFFER, SPRING))
+    expected = sc.msf(springs, [0.0, 0.6], **settings).exponent
+    with pytest.warns(UserWarning, match="left out the stops in links, which are open between equal oscillators"):
+        found = sc.msf(buffers.replace(e=0.5), [0.0, 0.6], a=0.2, **settings)
+    assert np.array_equal(found.exponent, expected)
+    assert found.exponent[0] != found.exponent[1]
+    for gap in (0.0, -1.0):
+        with pytest.raises(ValueError, match=CLOSED):
+            sc.msf(buffers, [0.0, 0.6], a=gap, **settings)
+        with pytest.raises(ValueError, match=CLOSED):
+            sc.exponents(buffers.replace(a=gap), [0.6], **settings)
+    moving = sc.Potential("k*W*(x_i - x_j)**2/2", {"k": 0.3}, events=[sc.Stop("x_j + x_i + 9")])
+    with pytest.raises(ValueError, match="found stops in links"):
+        sc.msf(scene(BALL, moving, sc.graphs.ring(3), 1.0, "auto"), [0.0, 0.6], **settings)
 
 
 def test_parts_have_no_common_nodes() -> None:
