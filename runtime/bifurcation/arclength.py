@@ -88,8 +88,7 @@ class BorderedFactors:
     """The LU factors of a matrix (size, size + 1) without one column; a singular matrix raises ArithmeticError."""
 
     def __init__(self, matrix: Matrix, column: int) -> None:
-        self.column = column
-        kept = np.delete(np.arange(matrix.shape[1]), column)
+        self.kept = kept = np.flatnonzero(np.arange(matrix.shape[1]) != column)
         try:
             if isinstance(matrix, np.ndarray):
                 factors, pivots, info = lapack.dgetrf(matrix[:, kept])
@@ -107,11 +106,17 @@ class BorderedFactors:
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Return the solution (size + 1,) whose unknown of the left-out column is 0."""
-        return np.insert(self._solve(right), self.column, 0.0)
+        return self._with(self._solve(right), 0.0)
 
     def null(self) -> np.ndarray:
         """Return the null vector (size + 1,) whose unknown of the left-out column is 1."""
-        return np.insert(-self._solve(self.right), self.column, 1.0)
+        return self._with(-self._solve(self.right), 1.0)
+
+    def _with(self, others: np.ndarray, value: float) -> np.ndarray:
+        """Return a vector (size + 1,) with the unknown of the left-out column."""
+        vector = np.full(len(others) + 1, value)
+        vector[self.kept] = others
+        return vector
 
 
 def correct(problem: BranchProblem, guess: np.ndarray, tangent: np.ndarray) -> Point | None:

@@ -34,7 +34,6 @@ from synchain.models.dynamics.reduction import collapse, quotient, without_drive
 from synchain.models.dynamics.synchrony import synchronous_node
 from synchain.models.scenes.scene import Scene
 
-from ..cells.drive_times import periods
 from ..cells.run_keywords import with_numbers
 from .arclength import Point
 from .equilibrium import Equilibrium, shifted_components
@@ -101,13 +100,11 @@ class Cycles:
     scale: np.ndarray  # (n,): extent of each state
     spans: np.ndarray  # (q,): the unit of each parameter
     phase: np.ndarray  # (m, n): the direction of the motion at the reference; the unknowns move across it
+    slopes: Sequence[Callable[..., float] | None]  # (q,): derivatives of the logarithm of the drive's frequency
     transversal: Transversal | None = None
     shift_names: tuple[str, ...] = ()
     speed: float = math.nan  # size of the rates where the extents were measured
     last: tuple[bytes, Image, np.ndarray] | None = field(default=None, repr=False)
-    driven: tuple[tuple[float, ...] | None, float] = field(
-        default=(None, 0.0), repr=False
-    )  # parameters and period of an orbit
 
     @classmethod
     def of(cls, orbit: PeriodicOrbit, *names: str) -> Cycles:
@@ -136,14 +133,15 @@ class Cycles:
         numbers = [values[name] for name in names]
         point = np.concatenate([states.ravel(), [] if drive_periods else [period], numbers])
         spans = np.array([abs(number) or 1.0 for number in numbers])
+        slopes = [_frequency_slope(equations, name) if drive_periods else None for name in names]
         problem = cls(
             scene, tuple(names), tuple(classes), flow, drive_periods, np.zeros(size), np.zeros((size, 0)), point,
-            np.ones(size), spans, np.zeros_like(states), Transversal.of(scene, tuple(classes)),
+            np.ones(size), spans, np.zeros_like(states), slopes, Transversal.of(scene, tuple(classes)),
         )  # fmt: skip
         distances = problem._find_turns_and_shifts(states, period)
         problem.point = point = np.insert(point, states.size, distances)
         problem._rescale(point)
-        problem._refer(point)
+        problem._refer(point, flow.rates(values, states))
         return problem
 
     @classmethod
@@ -182,7 +180,7 @@ class Cycles:
         states = np.tile(state, (factor, 1))
         problem = cls.near(orbit.scene, (name,), classes, states, orbit.period * factor, drive_periods)
         problem.scale = np.maximum(problem.scale, extent)  # the orbit may vanish there
-        problem._refer(problem.point)
+        problem._refer(problem.point, problem.flow.rates(problem.values(problem.point), problem.states(problem.point)))
         return problem, along[0], along[1]
 
     def start(self, direction: np.ndarray) -> Point:
@@ -231,20 +229,17 @@ class Cycles:
 
     def period(self, z: np.ndarray) -> float:
         """Return the period at a solution."""
-        return self._drive_period(self.values(z)) if self.periods else float(z[-1 - len(self.names)])
-
-    def _drive_period(self, values: Mapping[str, float]) -> float:
-        """Return the period of an orbit of a driven network; the last one is kept."""
-        numbers = tuple(values[name] for name in self.scene.equations.parameters)
-        if self.driven[0] != numbers:
-            self.driven = numbers, self.periods * float(periods(self.scene.equations, np.array([numbers]))[0])
-        return self.driven[1]
+        if self.periods:
+            return self.periods * self.flow.drive_period(self.values(z))
+        return float(z[-1 - len(self.names)])
 
     def period_slopes(self, values: Mapping[str, float]) -> np.ndarray:
         """Return the derivatives (q,) of the drive's period by the parameters; 0 without a drive."""
-        slopes = [_frequency_slope(self.scene.equations, name) if self.periods else None for name in self.names]
-        numbers = [values[name] for name in self.scene.equations.parameters]
-        return np.array([0.0 if s is None else -self._drive_period(values) * float(s(*numbers)) for s in slopes])
+        numbers = [values[name] for name in self.flow.equations.parameters]
+        shares = [0.0 if slope is None else -float(slope(*numbers)) for slope in self.slopes]
+        return (
+            self.periods * self.flow.drive_period(values) * np.array(shares) if any(shares) else np.zeros(len(shares))
+        )
 
     # --- equations ---
     def linearise(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -300,10 +295,11 @@ class Cycles:
         factor = self._finer() if grown > GROWTH else 1
         if factor > 1:
             z, tangent = self._divided(z, tangent, factor)
-        speed = float(np.linalg.norm(self.flow.rates(self.values(z), self.states(z)[:1])[0] / self.scale))
+        rates = self.flow.rates(self.values(z), self.states(z))
+        speed = float(np.linalg.norm(rates[0] / self.scale))
         if not self.speed / RESCALED < speed < self.speed * RESCALED:
             self._rescale(z)
-        self._refer(z)
+        self._refer(z, rates)
         return z, self._at_phase(tangent)
 
     def _at_phase(self, tangent: np.ndarray) -> np.ndarray:
@@ -340,12 +336,10 @@ class Cycles:
         self.phase = np.zeros((m * factor, self.phase.shape[1]))
         return np.append(parts[0], z[tail:]), np.append(parts[1], tangent[tail:])
 
-    def _refer(self, z: np.ndarray) -> None:
-        """Make a state the reference of the conditions."""
-        self.point, self.last = z, None if self.last is None or self.last[0] != z.tobytes() else self.last
-        rates = self.flow.rates(self.values(z), self.states(z)) / self.scale
-        size = float(np.linalg.norm(rates))
-        self.phase = rates / size if size > 0.0 else rates
+    def _refer(self, z: np.ndarray, rates: np.ndarray) -> None:
+        """Make a solution with rates (m, n) of its states the reference of the conditions."""
+        self.point, rates = z, rates / self.scale
+        self.phase = rates / (float(np.linalg.norm(rates)) or 1.0)
 
     def orbit_states(self, z: np.ndarray, looks: int = LOOKS) -> np.ndarray:
         """Return states (m * looks, n) at equal times on the orbit."""

@@ -202,16 +202,17 @@ def _nearest(point: Point) -> float:
 
 def _passing(step: BranchStep, indices: range, turn: float | None) -> Iterator[tuple[float, Located]]:
     """Yield a bifurcation for each critical value, or pair of values, that passes on a step."""
-    index = indices.start
+    index, neutral = indices.start, np.zeros(indices.stop, dtype=bool)
+    if turn is not None:  # real values that are neutral where the parameter turns
+        critical = critical_of(step.at(turn))
+        small = abs(critical.growth) <= TOUCHING * step.scale(step.at(turn))
+        neutral = small & (abs(critical.values.imag) <= REAL * critical.scale)
     while index < indices.stop:
-        distance = step.zero_of_growth(index)
+        turned = bool(neutral[index])
+        # A fold is located better by the turn: its value is a square root of the parameter.
+        distance = turn if turned and turn is not None else step.zero_of_growth(index)
         critical = critical_of(step.at(distance))
         paired = abs(critical.values[index].imag) > REAL * critical.scale
-        turned = False
-        if turn is not None and not paired:  # the value that passes is neutral at the turn
-            turned = abs(float(critical_of(step.at(turn)).growth[index])) <= TOUCHING * step.scale(step.at(turn))
-        if turned and turn is not None:
-            distance = turn  # a fold is located better by the turn: the value is a square root of the parameter
         value = complex(critical.values[index])
         kind, point = step.problem.kind(value if paired else complex(value.real), turned), step.at(distance)
         scale = step.scale(point)

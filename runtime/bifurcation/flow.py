@@ -68,6 +68,9 @@ class Flow(Protocol):
     size: int
     steps: float  # mean length of a step of the last call
 
+    def drive_period(self, values: Mapping[str, float]) -> float:
+        """Return the period of the drive; 0 without one."""
+
     def rates(self, values: Mapping[str, float], states: np.ndarray) -> np.ndarray:
         """Return the rates (m, n) at the beginning of a period of the drive."""
 
@@ -105,17 +108,31 @@ class LiftedFlow:
     size: int
     network: Linearised  # the equations at the beginning of a period of the drive
     steps: float = math.nan
+    last: tuple[tuple[float, ...], Linearised, CellRows, float] | None = field(default=None, repr=False)
+
+    def at(self, values: Mapping[str, float]) -> tuple[Linearised, CellRows, float]:
+        """Return equations, a row of a unit of time and the drive's period at some parameters; the last ones are kept."""
+        key = tuple(values[name] for name in self.equations.parameters)
+        if self.last is None or self.last[0] != key:
+            period = float(periods(self.equations, np.array([key]))[0])
+            self.last = key, self.network.at(values), _row(self.lift, values), period
+        return self.last[1:]
+
+    def drive_period(self, values: Mapping[str, float]) -> float:
+        """Return the period of the drive."""
+        return self.at(values)[2]
 
     def rates(self, values: Mapping[str, float], states: np.ndarray) -> np.ndarray:
         """Evaluate the templates, and solve with the mass matrix if there is one."""
-        network = self.network.at(values)
+        network, *_ = self.at(values)
         rates = [network.rates(state) for state in states]
-        masses = [network.mass(state) for state in states]
-        return np.array([r if m is None else spsolve(m, r) for r, m in zip(rates, masses, strict=True)])
+        if not network.mass_templates:
+            return np.array(rates)
+        return np.array([spsolve(network.mass(state), r) for state, r in zip(states, rates, strict=True)])
 
     def motion(self, values: Mapping[str, float], state: np.ndarray) -> tuple[OrbitIntegrator, RateFunctions]:
         """Return the motion from a state, and its rates."""
-        network = self.network.at(values)
+        network, *_ = self.at(values)
 
         def sizes(x: np.ndarray) -> np.ndarray:
             terms, mass = network.term_sizes(x), network.mass(x)
@@ -157,7 +174,7 @@ class LiftedFlow:
         scale: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Integrate rows of states, deviations and seeds; return the states and the deviations."""
-        rows = _rows(self.lift, values, self.present, states, deviations, seeds, times)
+        rows = _rows(self.lift, self.at(values)[1], self.present, states, deviations, seeds, times)
         self.job.control[Control.ATOL] = LEAST * TOLERANCE * float(scale[scale > 0.0].min(initial=1.0))
         buffers = self.job.run(rows)
         failed = buffers.status != Status.FINISHED
@@ -181,28 +198,34 @@ class Walker:
         self.steps += max(1, round(length / self.flow.steps))
 
 
+def _row(lift: Lift, values: Mapping[str, float]) -> CellRows:
+    """Return a row of a lifted network over a unit of time, with its parameters and the times of its drive."""
+    equations = lift.equations
+    numbers = np.array([[float(values.get(name, 0.0)) for name in equations.parameters]])
+    spans = np.zeros((1, len(SpanColumn)))
+    spans[:, SpanColumn.END], spans[:, SpanColumn.FIRST_STEP] = 1.0, FIRST_STEP
+    spans[:, SpanColumn.LOOK], spans[:, SpanColumn.LONGEST] = math.inf, math.inf
+    if equations.forced:
+        spans[:, SpanColumn.PERIOD] = periods(equations, numbers)
+        spans[:, SpanColumn.LONGEST] = longest_steps(equations, numbers, np.ones(1))
+    return CellRows(np.zeros((1, equations.dimension)), numbers, spans)
+
+
 def _rows(
     lift: Lift,
-    values: Mapping[str, float],
+    row: CellRows,
     names: Sequence[str],
     states: np.ndarray,
     deviations: np.ndarray,
     seeds: np.ndarray,
     times: np.ndarray,
 ) -> CellRows:
-    """Lay out rows of a lifted network. Shapes: states, deviations (k, n), seeds (k, q), times (k,)."""
-    equations = lift.equations
-    start = np.empty((len(states), equations.dimension))
+    """Lay out rows of a lifted network like a row. Shapes: states, deviations (k, n), seeds (k, q), times (k,)."""
+    start, numbers, spans = (np.repeat(each, len(states), axis=0) for each in (row.start, row.numbers, row.spans))
     start[:, lift.states], start[:, lift.deviations] = states, deviations
-    numbers = np.tile([float(values.get(name, 0.0)) for name in equations.parameters], (len(states), 1))
     for name, column in zip(names, seeds.T, strict=True):
-        numbers[:, equations.parameters.index(lift.seeds[name])] = column
-    spans = np.zeros((len(states), len(SpanColumn)))
+        numbers[:, lift.equations.parameters.index(lift.seeds[name])] = column
     spans[:, SpanColumn.END], spans[:, SpanColumn.FIRST_STEP] = times, FIRST_STEP * times
-    spans[:, SpanColumn.LOOK], spans[:, SpanColumn.LONGEST] = math.inf, math.inf
-    if equations.forced:
-        spans[:, SpanColumn.PERIOD] = periods(equations, numbers[:1])
-        spans[:, SpanColumn.LONGEST] = longest_steps(equations, numbers[:1], times.max(keepdims=True))
     return CellRows(start, numbers, spans)
 
 
@@ -224,10 +247,9 @@ def _lift(equations: Equations, names: tuple[str, ...]) -> Lift:
 
 def _job(scene: Scene, equations: Equations, names: tuple[str, ...], state: tuple[float, ...]) -> tuple[Lift, RowsJob]:
     """Return a lift and the job that integrates it, with the integrator for the motion from a state."""
-    lift, size = _lift(equations, names), len(state)
-    rows = _rows(
-        lift, scene.parameters, names, np.array([state]), np.ones((1, size)), np.zeros((1, len(names))), np.ones(1)
-    )
+    lift, q = _lift(equations, names), len(names)
+    at = np.array([state])
+    rows = _rows(lift, _row(lift, scene.parameters), names, at, np.ones_like(at), np.zeros((1, q)), np.ones(1))
     return lift, _compiled(lift.equations, chosen_for_rows(scene, lift.equations, rows), scene.max_steps)
 
 
@@ -251,6 +273,11 @@ class ContactFlow:
     size: int
     steps: float = math.nan
     method: Integrator | None = field(default=None, repr=False)
+
+    def drive_period(self, values: Mapping[str, float]) -> float:
+        """Return the period of the drive."""
+        numbers = np.array([[values[name] for name in self.equations.parameters]])
+        return float(periods(self.equations, numbers)[0])
 
     def rates(self, values: Mapping[str, float], states: np.ndarray) -> np.ndarray:
         """Evaluate the rates with the slip states that belong to the states."""
