@@ -240,6 +240,11 @@ def _begin(
     problem: Equilibria | Cycles
     problem = Equilibria.of(solution, name) if isinstance(solution, Equilibrium) else Cycles.of(solution, name)
     problem.set_ranges(np.array([size]))
+    return problem, _first_point(problem, sign)
+
+
+def _first_point(problem: Equilibria | Cycles, sign: float) -> Point:
+    """Return the first point of a branch; `sign` is the direction of the parameter."""
     tangent = np.zeros(len(problem.point))
     tangent[-1] = sign / problem.weights[-1]
     found = correct(problem, problem.point, tangent)
@@ -248,7 +253,7 @@ def _begin(
     if isinstance(problem, Equilibria):
         problem.scale_along(found.tangent[: problem.size])
     z, tangent = problem.accept(found.z, found.tangent)
-    return problem, Point(z, tangent, 0, problem.critical(z))
+    return Point(z, tangent, 0, problem.critical(z))
 
 
 def _leave(first: Bifurcation, name: str, sign: float, vector: int, size: float) -> tuple[Equilibria | Cycles, Point]:
@@ -355,9 +360,15 @@ def _trace(problem: Equilibria | Cycles, start: Point, limits: Limits) -> Part:
         if not last or abs(last[0].length - corner.point.length) > SAME_GRAZE:
             found.append(_corner(problem, corner))
         end = f"grazing at {problem.names[-1]} = {corner.point.value:.8g}"
-    elif corners and end.startswith("lost") and corners.event_at_start([point for point, _ in points]):
-        at = f"{problem.names[-1]} = {points[-1][0].value:.8g}"
-        end = f"an event at the beginning of a period at {at}, where the state jumps; shift the drive in time"
+    elif isinstance(problem, Cycles) and corners and end.startswith("lost"):
+        point, orbit = points[-1]
+        begin = corners.between_events(point)
+        if begin is not None and isinstance(orbit, PeriodicOrbit):  # go on with cycles that begin at another time
+            again = Cycles.of(orbit, *problem.names, begin=begin)
+            again.set_ranges(problem.spans)
+            first = _first_point(again, math.copysign(1.0, point.tangent[-1]))
+            more, others, end = _trace(again, replace(first, length=point.length), limits)
+            return points + more[1:], found + others, end
     return points, found, end
 
 
@@ -397,7 +408,7 @@ def _bifurcation(problem: Equilibria | Cycles, located: Located) -> Bifurcation:
         vectors = directions(problem.scene, solution.state, problem.vectors(point.z, 0.0, count))
         mode = problem.blocks.text(block) if problem.blocks is not None and block >= 0 else ""
     tangent = np.zeros(0)
-    if crosses:
+    if crosses and not (isinstance(problem, Cycles) and problem.begin):
         count_of_states = problem.flow.size if isinstance(problem, Cycles) else problem.size
         change = point.tangent[:count_of_states]
         if isinstance(problem, Cycles):

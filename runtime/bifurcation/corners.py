@@ -33,7 +33,7 @@ CLOSING = 1e-6
 
 
 EARLY = 1e-4
-"""An event this near to the beginning of a cycle, in cycles, ends a branch there (a choice)."""
+"""Where an event is this near to the beginning of a cycle, in cycles, the cycle begins elsewhere (a choice)."""
 
 MOVE = 0.75
 """Largest distance that a multiplier moves in a step, relative to its modulus if that exceeds 1 (a choice): a step that
@@ -76,7 +76,7 @@ class Corners:
         key = point.z.tobytes()
         if key not in self.known:
             values = {name: x for name, x in self.problem.values(point.z).items() if name in self.lone.parameters}
-            phases = phases_of(self.lone, values, self.problem.states(point.z)[0], self.problem.period(point.z))
+            phases = phases_of(self.lone, values, self.problem.at_drive(point.z)[0][0], self.problem.period(point.z))
             if phases is None:
                 raise RuntimeError("friction without phases has no corners")
             self.known[key] = phases
@@ -147,10 +147,17 @@ class Corners:
         gap = self.phases(points[-1]).gap
         return Corner(BifurcationKind.GRAZING, points[-1], abs(gap)) if abs(gap) < CLOSING else None
 
-    def event_at_start(self, points: list[Point]) -> bool:
-        """Return True if an event meets the beginning of the cycle, where the state jumps along the branch."""
-        phases = self.phases(points[-1])
-        return isinstance(phases, RowPhases) and phases.early < EARLY
+    def between_events(self, point: Point) -> float | None:
+        """Return a time far from events if one meets the beginning of the cycle, where the state jumps; None else."""
+        phases, period = self.phases(point), self.problem.period(point.z)
+        if not isinstance(phases, RowPhases) or not phases.times:
+            return None
+        away = (np.array(phases.times) - self.problem.begin / period + 0.5) % 1.0 - 0.5
+        if np.abs(away).min() >= EARLY:
+            return None
+        times = np.append(phases.times, phases.times[0] + 1.0)
+        widest = int(np.diff(times).argmax())
+        return float(times[widest : widest + 2].mean() % 1.0) * period
 
 
 def _same_slips(before: Phases, after: Phases) -> bool:

@@ -100,20 +100,26 @@ class Cycles:
     scale: np.ndarray  # (n,): extent of each state
     spans: np.ndarray  # (q,): the unit of each parameter
     phase: np.ndarray  # (m, n): the direction of the motion at the reference; the unknowns move across it
-    slopes: Sequence[Callable[..., float] | None]  # (q,): derivatives of the logarithm of the drive's frequency
+    slopes: Sequence[
+        Callable[[Mapping[str, float]], float] | None
+    ]  # (q,): derivatives of the logarithm of the drive's frequency
     transversal: Transversal | None = None
+    begin: float = 0.0  # time of the drive at which the first segment begins, between events
     shift_names: tuple[str, ...] = ()
     speed: float = math.nan  # size of the rates where the extents were measured
     last: tuple[bytes, Image, np.ndarray] | None = field(default=None, repr=False)
 
     @classmethod
-    def of(cls, orbit: PeriodicOrbit, *names: str) -> Cycles:
-        """Return the problem of a periodic orbit along parameters."""
+    def of(cls, orbit: PeriodicOrbit, *names: str, begin: float = 0.0) -> Cycles:
+        """Return the problem of a periodic orbit along parameters; `begin`: where the first segment begins."""
         count = len(set(orbit.classes))
         copies = expansion(orbit.scene.equations, orbit.classes, len(orbit.state) * count // orbit.scene.n)
         state = copies.T @ orbit.state / copies.sum(axis=0)
+        if begin:
+            flow = flow_of(orbit.scene, quotient_of(orbit.scene, orbit.classes, ()), (), state)
+            state = flow.advance(orbit.scene.parameters, state[None], np.full(1, begin))[0]
         return cls.near(
-            orbit.scene, names, orbit.classes, state[None], orbit.period, 0 if orbit.free else orbit.periods
+            orbit.scene, names, orbit.classes, state[None], orbit.period, 0 if orbit.free else orbit.periods, begin
         )
 
     @classmethod
@@ -125,10 +131,11 @@ class Cycles:
         states: np.ndarray,
         period: float,
         drive_periods: int,
+        begin: float = 0.0,
     ) -> Cycles:
         """Return the problem near an orbit of a network. Shapes: states (m, n) of the quotient, period of the whole orbit."""
         equations = quotient_of(scene, classes, names)
-        flow = flow_of(scene, equations, names, states[0])
+        flow = flow_of(scene, equations, names, states[0], begin)
         size, values = flow.size, scene.parameters
         numbers = [values[name] for name in names]
         point = np.concatenate([states.ravel(), [] if drive_periods else [period], numbers])
@@ -136,7 +143,7 @@ class Cycles:
         slopes = [_frequency_slope(equations, name) if drive_periods else None for name in names]
         problem = cls(
             scene, tuple(names), tuple(classes), flow, drive_periods, np.zeros(size), np.zeros((size, 0)), point,
-            np.ones(size), spans, np.zeros_like(states), slopes, Transversal.of(scene, tuple(classes)),
+            np.ones(size), spans, np.zeros_like(states), slopes, Transversal.of(scene, tuple(classes)), begin,
         )  # fmt: skip
         distances = problem._find_turns_and_shifts(states, period)
         problem.point = point = np.insert(point, states.size, distances)
@@ -220,6 +227,14 @@ class Cycles:
         """Return the states (m, n) at the beginning of the segments."""
         return z[: self.phase.size].reshape(self.phase.shape)
 
+    def at_drive(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the states (m, n) where periods of the drive begin, and the propagators (m, n, n) to them."""
+        states, (m, n) = self.states(z), self.phase.shape
+        if not self.begin:
+            return states, np.tile(np.eye(n), (m, 1, 1))
+        left = np.full(m, self.period(z) - self.begin)
+        return self.flow.linearise(self.values(z), states, left, self.scale)[:2]
+
     def values(self, z: np.ndarray) -> dict[str, float]:
         """Return the parameters at a solution."""
         return {
@@ -235,8 +250,7 @@ class Cycles:
 
     def period_slopes(self, values: Mapping[str, float]) -> np.ndarray:
         """Return the derivatives (q,) of the drive's period by the parameters; 0 without a drive."""
-        numbers = [values[name] for name in self.flow.equations.parameters]
-        shares = [0.0 if slope is None else -float(slope(*numbers)) for slope in self.slopes]
+        shares = [0.0 if slope is None else -slope(values) for slope in self.slopes]
         return (
             self.periods * self.flow.drive_period(values) * np.array(shares) if any(shares) else np.zeros(len(shares))
         )
@@ -430,7 +444,7 @@ class Cycles:
         z = point.z
         critical = self.critical(z) if point.critical is None else point.critical
         image, rates = self._image(z)
-        values, state = self.values(z), self.states(z)[0]
+        values, state = self.values(z), self.at_drive(z)[0][0]
         along = critical.blocks < 0
         neutral = np.ones(self.shifts.shape[1])
         if not self.periods:
@@ -463,7 +477,7 @@ class Cycles:
         along = self.multipliers(z)
         blocks = np.full(len(along), -1)
         if self.transversal is not None:
-            across, of = self.transversal.multipliers(self.values(z), self.states(z), self.period(z), self.scale)
+            across, of = self.transversal.multipliers(self.values(z), self.at_drive(z)[0], self.period(z), self.scale)
             along, blocks = np.concatenate([along, across]), np.concatenate([blocks, of])
         return GrowthNumbers.of(np.abs(along) - 1.0, along, blocks)
 
@@ -490,10 +504,10 @@ class Cycles:
         `block` is that of the multiplier in `critical`.
         """
         if block >= 0 and self.transversal is not None:
-            return self.transversal.vectors(self.values(z), self.states(z), self.period(z), value, count)
+            return self.transversal.vectors(self.values(z), self.at_drive(z)[0], self.period(z), value, count)
         matrices, bases = self._reduced(z)
         small = null_vectors(matrices, value, count)
-        vectors = self.scale[:, None] * (bases[0] @ small)
+        vectors = self.at_drive(z)[1][0] @ (self.scale[:, None] * (bases[0] @ small))
         return np.linalg.qr(expansion(self.scene.equations, self.classes, len(self.scale)) @ vectors)[0]
 
     def birth(self, z: np.ndarray) -> BifurcationKind | None:
@@ -533,16 +547,17 @@ def quotient_of(scene: Scene, classes: Sequence[int], names: Sequence[str]) -> E
 
 
 @lru_cache(maxsize=32)
-def _frequency_slope(equations: Equations, name: str) -> Callable[..., float] | None:
+def _frequency_slope(equations: Equations, name: str) -> Callable[[Mapping[str, float]], float] | None:
     """Return the derivative of the logarithm of the drive's frequency by a parameter; None if it does not enter."""
     frequency, symbol = angular_frequency(equations), sp.Symbol(name, real=True)
     if frequency is None or not frequency.has(symbol):
         return None
     # Frequencies with a common divisor are proportional to each other: the first of them decides.
     first = frequency.replace(lambda e: e.func.__name__ == "common", lambda e: e.args[0])
-    symbols = [sp.Symbol(each, real=True) for each in equations.parameters]
-    slope: Callable[..., float] = sp.lambdify(symbols, sp.simplify(first.diff(symbol) / first), "numpy")
-    return slope
+    slope = sp.simplify(first.diff(symbol) / first)
+    symbols = sorted(slope.free_symbols, key=str)
+    function = sp.lambdify(symbols, slope, "numpy")
+    return lambda values: float(function(*(values[s.name] for s in symbols)))
 
 
 def _classes_of(scene: Scene, rows: np.ndarray) -> tuple[int, ...]:

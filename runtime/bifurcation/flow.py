@@ -25,7 +25,7 @@ from synchain.codegen.machine_code.compile import load
 from synchain.models.dynamics.angles import periods_of_states
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.lift import Lift, lifted
-from synchain.models.dynamics.variational import Variation, network_variation
+from synchain.models.dynamics.variational import PHASE, Variation, clock_shifted, network_variation
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
 
@@ -84,14 +84,15 @@ class Flow(Protocol):
         """Return the states after the times with their derivatives; `scale` (n,) is the size of a deviation."""
 
 
-def flow_of(scene: Scene, equations: Equations, names: Sequence[str], state: np.ndarray) -> Flow:
+def flow_of(scene: Scene, equations: Equations, names: Sequence[str], state: np.ndarray, begin: float = 0.0) -> Flow:
     """Return the flow of equations that belong to a scene, with its derivatives by some parameters.
 
-    The kernel is chosen by the motion at a state (n,).
+    The kernel is chosen by the motion at a state (n,).  Under events the flow may begin at another time than 0.
     """
     present = tuple(name for name in names if name in equations.parameters)
     if equations.sticks:
-        return ContactFlow(scene, equations, present, tuple(names), equations.continuous_dimension)
+        shifted = clock_shifted(equations) if begin else equations
+        return ContactFlow(scene, shifted, present, tuple(names), equations.continuous_dimension, begin)
     lift, job = _job(scene.replace(rtol=TOLERANCE, atol=None), equations, present, tuple(map(float, state)))
     return LiftedFlow(equations, lift, job, present, tuple(names), equations.dimension, _linearised(equations))
 
@@ -271,13 +272,18 @@ class ContactFlow:
     present: tuple[str, ...]  # the parameters among `names` that the equations contain
     names: tuple[str, ...]
     size: int
+    begin: float = 0.0  # time of the drive at which the flow begins
     steps: float = math.nan
     method: Integrator | None = field(default=None, repr=False)
 
+    def _numbers(self, values: Mapping[str, float], rows: int = 1) -> np.ndarray:
+        """Return the parameters (rows, parameters) of the equations."""
+        known = {**values, PHASE.name: self.begin}
+        return np.tile([known[name] for name in self.equations.parameters], (rows, 1))
+
     def drive_period(self, values: Mapping[str, float]) -> float:
         """Return the period of the drive."""
-        numbers = np.array([[values[name] for name in self.equations.parameters]])
-        return float(periods(self.equations, numbers)[0])
+        return float(periods(self.equations, self._numbers(values))[0])
 
     def rates(self, values: Mapping[str, float], states: np.ndarray) -> np.ndarray:
         """Evaluate the rates with the slip states that belong to the states."""
@@ -294,7 +300,7 @@ class ContactFlow:
     def _integrator(self, values: Mapping[str, float], states: np.ndarray) -> VariationalIntegrator:
         """Return an integrator from states with slip states, with all deviations."""
         variation, none = _contact_variation(self.equations, self.present), np.zeros((0, self.size + len(self.present)))
-        numbers = np.tile([values[name] for name in self.equations.parameters], (len(states), 1))
+        numbers = self._numbers(values, len(states))
         if self.method is None:
             self.method = chosen_for_modes(self.scene, variation, states, numbers, none)
         integrator = VariationalIntegrator.make(self.scene, variation, states, numbers, none, 1, method=self.method)
@@ -305,12 +311,12 @@ class ContactFlow:
         return integrator
 
     def _functions(self, values: Mapping[str, float]) -> RateFunctions:
-        return _contact_rates(self.equations, tuple(values[name] for name in self.equations.parameters))
+        return _contact_rates(self.equations, tuple(self._numbers(values)[0]))
 
     def _with_slips(self, values: Mapping[str, float], states: np.ndarray) -> np.ndarray:
         """Return states with slip states; a velocity that differs from the ground's by rounding is the ground's."""
         n = self.equations.n
-        numbers = np.tile([values[name] for name in self.equations.parameters], (len(states), 1))
+        numbers = self._numbers(values, len(states))
         modes = np.zeros((len(states), self.equations.dimension - self.size))
         if self.equations.has_rows:
             slack = STICKS * TOLERANCE * float(np.abs(states).max())

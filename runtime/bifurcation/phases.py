@@ -65,7 +65,7 @@ class RowPhases(Phases):
     """Events of one cycle of a node with rows: `slip_states` holds 16 times the row, and the modes before and after."""
 
     names: tuple[str, ...] = ()  # of the rows
-    early: float = math.inf  # time between an event and the beginning of the cycle, as a part of the cycle
+    times: tuple[float, ...] = ()  # of the events, in cycles, ascending
 
     @property
     def words(self) -> str:
@@ -137,8 +137,8 @@ def _phases_of_rows(scene: Scene, values: Mapping[str, float], state: np.ndarray
     rotations = (tuple(codes[k:] + codes[:k]) for k in range(len(codes)))
     modes = iter(node.modes)
     names = tuple("guard" if row.law is Law.RESET else str(next(modes)) for row in node.rows)
-    early = np.minimum(events[0], period - events[0]).min(initial=math.inf) / period
-    return RowPhases(min(rotations, default=()), min(gaps), math.inf, names, float(early))
+    times = tuple(np.sort(events[0] / period % 1.0).tolist())
+    return RowPhases(min(rotations, default=()), min(gaps), math.inf, names, times)
 
 
 @lru_cache(maxsize=16)

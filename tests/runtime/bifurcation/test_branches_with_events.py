@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 import sympy as sp
 
@@ -67,7 +68,15 @@ def test_a_branch_without_impacts_ends_where_it_grazes_the_stop() -> None:
     assert found.value == pytest.approx(F, abs=1e-9)
 
 
-def test_an_impact_that_meets_the_beginning_of_a_period_ends_a_branch_in_words() -> None:
-    orbit = sc.periodic_orbit(lone(oscillator(0), 0.4, -0.5, 0.35).replace(transient=100), 1)
-    branch = sc.follow(orbit, "a", to=0.33)
-    assert "an event at the beginning of a period at a = 0.3377" in str(branch)
+def test_a_branch_goes_on_where_an_impact_meets_the_beginning_of_a_period() -> None:
+    """At a = 0.3377; the same oscillator with a drive that is shifted by a radian meets no impact there."""
+    first = sc.periodic_orbit(lone(oscillator(0), 0.4, -0.5, 0.35).replace(transient=100), 1)
+    branch = sc.follow(first, "a", to=0.33)
+    assert branch.ends == ("a = 0.33",)
+    assert np.all(np.diff(branch.values) < 0.0)
+    other = sc.periodic_orbit(lone(oscillator(1), 0.4, -0.5, 0.35).replace(transient=100), 1)
+    shifted = sc.follow(other, "a", to=0.33)
+    np.testing.assert_allclose(branch[-1].multipliers, shifted[-1].multipliers, rtol=1e-8)
+    alone = sc.periodic_orbit(branch[-1].scene, 1, branch[-1].state)
+    np.testing.assert_allclose(alone.state, branch[-1].state, atol=1e-10)
+    assert {orbit.phases.words for orbit in branch} == {"open jumps"}
