@@ -432,7 +432,7 @@ def _check_name(what: str, scene: Scene, name: str) -> None:
 def _array(name: str, value: object) -> np.ndarray:
     try:
         array = np.asarray(value)
-        if array.dtype == bool:
+        if array.dtype.kind in "bc":  # astype would drop imaginary parts
             raise TypeError
         return array.astype(float)
     except (TypeError, ValueError):

@@ -278,9 +278,9 @@ def test_what_has_no_answer_is_refused(call: Any, message: str) -> None:
         call()
 
 
-@pytest.mark.parametrize("value", [True, [True, False], np.True_])
-def test_truth_values_are_no_numbers(value: Any) -> None:
-    with pytest.raises(TypeError, match=r"k = .*True.*; expected a number or an array of numbers"):
+@pytest.mark.parametrize("value", [True, [True, False], np.True_, 2j, np.array([1.0, 2j])])
+def test_truth_values_and_complex_numbers_are_refused(value: Any) -> None:
+    with pytest.raises(TypeError, match=r"k = .*(True|2\.?j).*; expected a number or an array of numbers"):
         sc.compile(scene(), ["k"])(k=value)
 
 
