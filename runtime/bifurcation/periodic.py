@@ -22,6 +22,7 @@ from numbers import Integral, Real
 import numpy as np
 from scipy.optimize import brentq
 
+from synchain.models.dynamics.angles import periods_of_states, whole_turns
 from synchain.models.dynamics.reduction import NoQuotient, quotient
 from synchain.models.dynamics.synchrony import NoSynchrony
 from synchain.models.inputs.checks import check_number, is_row, short_repr
@@ -302,7 +303,17 @@ def _settled(flow: Flow, scene: Scene, state: np.ndarray) -> np.ndarray:
         some = min(left, TOGETHER)
         state = flow.advance(scene.parameters, state[None], np.full(1, some * unit))[0]
         left -= some
-    return state
+    return _unwound(flow, state)
+
+
+def _unwound(flow: Flow, state: np.ndarray) -> np.ndarray:
+    """Take whole turns from the angles of a state: those of the first node end near 0, those of others near the first's."""
+    periods = periods_of_states(flow.equations)
+    state = state - whole_turns(periods, state)
+    if flow.equations.mixed:
+        return state
+    first = np.repeat(state.reshape(-1, flow.equations.n)[:, 0], flow.equations.n)
+    return np.asarray(state - whole_turns(periods, state - first))
 
 
 def _cycle(scene: Scene, classes: tuple[int, ...], flow: Flow, state: np.ndarray) -> tuple[Cycles, np.ndarray, int]:
@@ -316,14 +327,14 @@ def _cycle(scene: Scene, classes: tuple[int, ...], flow: Flow, state: np.ndarray
         walker.advance(some * turns.time)
         left -= some
     settled = walker.state[0]
-    state = settled[:size]
+    state = settled[:size] = _unwound(flow, settled[:size])
     if rests(rates, settled, REST, turns.extent):
         at = ", ".join(f"{name} = {x:.6g}" for name, x in islice(zip(flow.equations.state, state, strict=False), 8))
         raise ArithmeticError(f"no cycle: the motion comes to rest at {at}; `equilibrium` finds such states")
     found = returns(lambda x: flow.motion(values, x)[0], rates, turns.extent, settled)
     for time, extent in islice(found, RETURNS):
         image = flow.advance(values, state[None], np.full(1, time))[0]
-        if not np.all(np.abs(image - state) <= NEAR * extent[:size]):
+        if not np.all(np.abs(rates.difference(image, state)) <= NEAR * extent[:size]):
             continue
         problem = Cycles.near(scene, (), classes, state[None], time, 0)
         z, _, steps = problem.solved()
@@ -370,7 +381,13 @@ def _described(problem: Cycles, orbit: PeriodicOrbit, z: np.ndarray) -> Periodic
     # In the frame that moves with the shifts.
     distances = z[problem.phase.size : problem.phase.size + problem.shifts.shape[1]]
     frame = np.outer(np.arange(looks * problem.segments) / (looks * problem.segments), problem.shifts @ distances)
-    motion = (problem.orbit_states(z, looks) - frame) @ expansion(scene.equations, orbit.classes, problem.flow.size).T
+    copies = expansion(scene.equations, orbit.classes, problem.flow.size)
+    motion = (problem.orbit_states(z, looks) - frame) @ copies.T
+    # A point on the circle stands for an angle that turns all the way round.
+    turning = np.repeat((copies @ problem.turns).reshape(-1, scene.n).any(axis=1), scene.n)
+    angles = np.array([period or math.inf for period in periods_of_states(scene.equations)[: len(turning)]])
+    phases = 2.0 * math.pi * motion[:, turning] / angles[turning]
+    motion = np.hstack([motion[:, ~turning], np.cos(phases), np.sin(phases)])
     return replace(orbit, pattern=pattern_of(motion.reshape(looks, -1, scene.n), [*map(str, scene.topology.labels)]))
 
 

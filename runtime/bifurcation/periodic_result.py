@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import xarray as xr
 
-from synchain.models.dynamics.angles import periods_of_states
+from synchain.models.dynamics.angles import periods_of_states, whole_turns
 from synchain.models.scenes.scene import Scene
 
 from ..results.labelled import Labelled, dataset, scene_text
@@ -231,7 +231,7 @@ class PeriodicOrbit(Labelled):
     def meets(self, state: np.ndarray) -> bool:
         """Return whether a state is that of the orbit, to within SAME and whole turns of angles."""
         gap = state - self.state
-        return closed(gap - whole_turns(self.scene, gap), SAME * self.extent, self.state)
+        return closed(gap - whole_turns(periods_of_states(self.scene.equations), gap), SAME * self.extent, self.state)
 
     def transversal_multipliers(self, alpha: float) -> np.ndarray:
         """Compute the multipliers of a transversal mode along the orbit of nodes that move alike.
@@ -278,15 +278,6 @@ def sorted_by_size(multipliers: np.ndarray) -> np.ndarray:
 def closed(gap: np.ndarray, allowed: np.ndarray, state: np.ndarray) -> bool:
     """Return whether every component of a gap at a state is as small as allowed, but for errors of the integration."""
     return bool(np.all(np.abs(gap) <= allowed + ROUNDING * np.abs(state)))
-
-
-def whole_turns(scene: Scene, differences: np.ndarray) -> np.ndarray:
-    """Return the whole turns in differences (..., states) of states; 0 for states that are no angles."""
-    turns = np.zeros_like(differences)
-    for place, period in enumerate(periods_of_states(scene.equations)[: differences.shape[-1]]):
-        if period is not None:
-            turns[..., place] = period * np.round(differences[..., place] / period)
-    return turns
 
 
 def _listed(multipliers: np.ndarray) -> str:

@@ -19,6 +19,7 @@ from numbers import Integral
 
 import numpy as np
 
+from synchain.models.dynamics.angles import periods_of_states, whole_turns
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import check_keys, check_number, check_seed, check_table, short_repr
 from synchain.models.inputs.frozen import FrozenDict
@@ -35,7 +36,7 @@ from .deflation import equilibria
 from .equilibrium import Equilibrium
 from .flow import TOLERANCE
 from .periodic import NEWTON, check_periods, periodic_orbit
-from .periodic_result import PeriodicOrbit, whole_turns
+from .periodic_result import PeriodicOrbit
 from .results import Branch, Diagram
 from .switching import SAME, permutations_of
 
@@ -322,7 +323,7 @@ def _returning(scene: Scene, path: np.ndarray, extent: np.ndarray, periods: int)
         k, motion = np.unravel_index(flat, gap.shape)
         if gap[k, motion] > CLOSE or len(starts) == TRIES:
             break
-        state = path[k, motion] - whole_turns(scene, path[k, motion] - first)
+        state = path[k, motion] - whole_turns(periods_of_states(scene.equations), path[k, motion] - first)
         if all(np.abs((state - start) / np.minimum(size[motion], its)).max() > APART for start, its in starts):
             starts.append((state, size[motion]))
     return [state for state, _ in starts]

@@ -1,7 +1,7 @@
 """Find limit cycles of undriven oscillators by Newton's method for the state and the period.
 
-The unknowns are the state x and the period T, and the equation is flow(x, T) = x. A phase condition keeps the
-correction of x normal to the motion. Source: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed.
+The unknowns are the state x and the period T, and the equation is flow(x, T) = x, but for whole turns of angles. A
+phase condition keeps the correction of x normal to the motion. Source: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed.
 (Springer, 2010), section 7.2.
 """
 
@@ -83,14 +83,17 @@ def returns(
     `begin` returns an integrator that begins at a state; `extent` (p,) is that of the motion.
     """
     integrator, time = begin(start), 0.0
-    normal = rates.values(start) / _scale(extent) ** 2  # normal in units of the extent of each component
+    # A motion that turns all the way round extends over a turn.
+    turns = np.array([math.inf if period is None else period for period in rates.periods])
+    turns = np.pad(turns, (0, len(start) - len(turns)), constant_values=math.inf)
+    normal = rates.values(start) / _scale(np.minimum(extent, turns)) ** 2  # in units of the extent of each component
 
     def side(state: np.ndarray) -> float:
-        return float(normal @ (state[0] - start))
+        return float(normal @ rates.difference(state[0], start))
 
     for before, step, moved, _ in islice(path(integrator, rates, shortest_time(rates, start)), SAMPLES):
         if side(before) < 0.0 <= side(integrator.state):
-            yield time + _passage(integrator, before, step, side), np.maximum(moved, NEAR * extent)
+            yield time + _passage(integrator, before, step, side), np.minimum(np.maximum(moved, NEAR * extent), turns)
         time += step
 
 
@@ -148,7 +151,7 @@ def _newton(problem: OrbitProblem, start: np.ndarray, time: float, extent: np.nd
             image, matrix = _flow(problem, state, period)
         except FloatingPointError:  # the last correction led too far away
             return None
-        gap = (image - state)[:p]
+        gap = rates.difference(image, state)[:p]
         if not np.all(np.abs(gap) <= near):
             return None
         if np.all(np.abs(gap) <= closed * extent[:p] + rates.rounding(image, period)[:p]):
@@ -175,7 +178,7 @@ def _least(problem: OrbitProblem, cycle: Cycle, extent: np.ndarray, closed: floa
     for parts in range(RETURNS, 1, -1):
         integrator.advance(cycle.period / parts - time)
         time = cycle.period / parts
-        if np.all(np.abs(integrator.state[0] - cycle.state) <= near):
+        if np.all(np.abs(problem.rates.difference(integrator.state[0], cycle.state)) <= near):
             part = _newton(problem, cycle.state, time, extent, closed)
             if part is not None and abs(part.period - time) < NEAR * time:
                 return part

@@ -18,7 +18,7 @@ import numpy as np
 import sympy as sp
 
 from synchain.codegen.driver.columns import Control
-from synchain.models.dynamics.angles import periods_of_states
+from synchain.models.dynamics.angles import periods_of_states, whole_turns
 from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.keywords import warn
 from synchain.models.mechanics.components import TIME, Edge, Node
@@ -111,6 +111,10 @@ class RateFunctions(NamedTuple):
     values: Callable[[np.ndarray], np.ndarray]
     sizes: Callable[[np.ndarray], np.ndarray]
     periods: tuple[float | None, ...] = ()  # the period of each state that is an angle, None for the others
+
+    def difference(self, state: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """Return the difference (p,) of two states without whole turns of angles."""
+        return state - start - whole_turns(self.periods, state - start)
 
     def rounding(self, state: np.ndarray, time: float) -> np.ndarray:
         """Return the distance (p,) by which rounding alone may move each component within a time."""
