@@ -23,7 +23,7 @@ from synchain.models.scenes.scene import Scene
 from .arclength import FIRST_STEP, LARGEST_STEP, MOST, Limits, Point, at_value, correct, walk
 from .corners import Corner, Corners, cycle_bifurcations
 from .curves import follow_curve
-from .cycles import Cycles
+from .cycles import Cycles, classes_of
 from .detection import TOGETHER, Located, bifurcations, critical_of
 from .equilibria import Equilibria
 from .equilibrium import Equilibrium, equilibrium
@@ -272,6 +272,7 @@ def _leave(first: Bifurcation, name: str, sign: float, vector: int, size: float)
         problem, along = Cycles.at_hopf(solution, name, first.vectors[vector], first.frequency)
     else:
         problem = Equilibria.of(solution, name)
+        problem.unite(classes_of(solution.scene, np.stack([solution.state, along])))
     problem.set_ranges(np.array([size]))
     if isinstance(problem, Equilibria):
         problem.scale_along(along)

@@ -154,7 +154,7 @@ class Cycles:
     @classmethod
     def at_hopf(cls, rest: Equilibrium, name: str, vector: np.ndarray, frequency: float) -> tuple[Cycles, np.ndarray]:
         """Return the cycles born at a Hopf point, and their first direction (n,). Shapes: vector (states,) complex."""
-        classes = _classes_of(rest.scene, np.stack([rest.state, vector.real, vector.imag]))
+        classes = classes_of(rest.scene, np.stack([rest.state, vector.real, vector.imag]))
         # Real and imaginary part of the eigenvector are orthogonal; the phase of the cycle is fixed across the second.
         vector = vector * np.exp(-0.5j * np.angle(np.sum(vector**2)))
         copies = expansion(rest.scene.equations, classes, len(vector) * len(set(classes)) // rest.scene.n)
@@ -179,7 +179,7 @@ class Cycles:
         `known` (states,), the change of the states along the known branch, is returned on the quotient too.  `factor` is
         the number of periods in a period of the new branch: 2 at a period doubling.
         """
-        classes = _classes_of(orbit.scene, np.stack([orbit.state, vector]))
+        classes = classes_of(orbit.scene, np.stack([orbit.state, vector]))
         copies = expansion(orbit.scene.equations, classes, len(vector) * len(set(classes)) // orbit.scene.n)
         rows = (orbit.state, np.broadcast_to(orbit.extent, len(vector)), vector, known)
         state, extent, *along = ((copies.T @ each) / copies.sum(axis=0) for each in rows)
@@ -560,7 +560,7 @@ def _frequency_slope(equations: Equations, name: str) -> Callable[[Mapping[str, 
     return lambda values: float(function(*(values[s.name] for s in symbols)))
 
 
-def _classes_of(scene: Scene, rows: np.ndarray) -> tuple[int, ...]:
+def classes_of(scene: Scene, rows: np.ndarray) -> tuple[int, ...]:
     """Return the clusters of nodes whose states agree in all rows (k, states) and that symmetry keeps alike."""
     equations, alone = scene.equations, tuple(range(scene.n))
     if scene.n == 1 or equations.mixed or equations.differing:

@@ -72,6 +72,7 @@ class Equilibria:
         self.pinned = np.array([each[0] for each in rows], dtype=int)
         pins = (np.ones(len(rows)), (np.arange(len(rows)), self.pinned))
         self.pins = sparse.csc_array(pins, (len(rows), self.size))
+        self.leaders = np.arange(self.size)  # (states,): the state that each is kept equal to
         self.blocks = ModeBlocks.of(equations)
         self.point = np.concatenate([state, speeds, [self.values[name] for name in names]])
         self.component_scales = np.zeros(len(equations.components))
@@ -89,6 +90,15 @@ class Equilibria:
         """Return the reference with a tangent along a direction (states,)."""
         tangent = np.append(direction, np.zeros(len(self.point) - self.size))
         return Point(self.point, tangent / float(np.linalg.norm(self.weights * tangent)), 0)
+
+    def unite(self, classes: tuple[int, ...]) -> None:
+        """Keep the nodes of a cluster equal: where branches of other symmetries meet, the equations alone are singular.
+
+        Their symmetry keeps a branch among such states (Golubitsky, Stewart & Schaeffer, section XIII.3).
+        """
+        first = [classes.index(each) for each in classes]
+        components = np.arange(self.size).reshape(-1, len(classes))
+        self.leaders = components[:, first].ravel()
 
     def set_ranges(self, ranges: np.ndarray) -> None:
         """Measure parameters by the lengths of their ranges; one without bounds, inf, by its largest value so far."""
@@ -171,6 +181,17 @@ class Equilibria:
             entries, matrix = whole.data, whole.toarray() if self.size <= SMALL else sparse.csc_array(whole)
         if not (np.isfinite(residual).all() and np.isfinite(entries).all()):
             raise ArithmeticError("a rate or its slope has no value")
+        followers = np.flatnonzero(self.leaders != np.arange(self.size))
+        if len(followers):  # x_i - x_leader = 0 in units of rates
+            unit, leaders = float(np.abs(entries).max()), self.leaders[followers]
+            residual[followers] = unit * (state[followers] - state[leaders])
+            equal = sparse.csc_array(
+                (np.repeat([unit, -unit], len(followers)), (np.tile(followers, 2), np.append(followers, leaders))),
+                matrix.shape,
+            )
+            kept = sparse.diags_array(np.isin(np.arange(len(residual)), followers, invert=True).astype(float))
+            united = sparse.csc_array(kept @ sparse.csc_array(matrix) + equal)
+            matrix = united.toarray() if isinstance(matrix, np.ndarray) else united
         return residual, matrix
 
     def noise(self, z: np.ndarray) -> np.ndarray:

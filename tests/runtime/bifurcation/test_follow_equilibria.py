@@ -98,6 +98,39 @@ def test_a_double_branch_point_has_a_branch_for_each_class_of_symmetry() -> None
             assert max(each.residual for each in other) < 1e-12
 
 
+@pytest.mark.parametrize(("size", "time"), [(1.0, 1.0), (1e-6, 1e6), (1e3, 1e-3)])
+def test_the_branches_of_a_double_branch_point_keep_their_symmetry(size: float, time: float) -> None:
+    """Four Brusselators on a ring: along (0, 1, 0, -1) the nodes 1 and 3 stay equal; a reference solves for three nodes."""
+    rates = {"x": "(A - (B + 1)*x/S + (x/S)**2*y/S)*S/T", "y": "(B*x/S - (x/S)**2*y/S)*S/T"}
+    node = sc.Field(
+        rates, parameters={"A": 1.5, "B": 1, "S": size, "T": time}, initial={"x": 1.5 * size, "y": size / 1.5}
+    )
+    link = sc.Rates({"x": "a*W*(x_j - x_i)", "y": "b*W*(y_j - y_i)"}, {"a": 0.1 / time, "b": 1 / time})
+    along = sc.follow(sc.equilibrium(sc.Scene(node, link, sc.graphs.ring(4))), "B", to=3)
+    point = next(each for each in along.points["branch point"] if len(each.vectors) == 2 and each.value < 2.6)
+    assert point.value == pytest.approx(2.55, rel=1e-10)
+    which = int(np.argmin([abs(each[0]) for each in point.vectors]))
+    branch = sc.follow(point, "B", within=(2, 6), vector=which)
+    states = np.array([each.state for each in branch]).reshape(len(branch), 2, 4) / size
+    np.testing.assert_allclose(states[:, :, 0], states[:, :, 2], rtol=1e-12)
+
+    def reaction(z: np.ndarray, B: float) -> np.ndarray:
+        x, y = z.reshape(2, 4)
+        spread = [np.roll(u, 1) + np.roll(u, -1) - 2 * u for u in (x, y)]
+        return np.concatenate([1.5 - (B + 1) * x + x**2 * y + 0.1 * spread[0], B * x - x**2 * y + spread[1]])
+
+    for end in (states[0], states[-1]):
+        np.testing.assert_allclose(reaction(end.ravel(), 6.0), 0, atol=1e-10)
+    assert np.abs(states[-1] - states[0][:, [2, 3, 0, 1]]).max() < 1e-9  # both halves are images of each other
+    for hopf in branch.points["Hopf"]:
+        z, h = hopf.solution.state / size, 1e-6
+        slopes = [(reaction(z + h * e, hopf.value) - reaction(z - h * e, hopf.value)) / (2 * h) for e in np.eye(8)]
+        pair = min(np.linalg.eigvals(np.array(slopes).T), key=lambda value: abs(value.real) - (value.imag > 0.1))
+        assert abs(pair.real) < 1e-7
+        assert hopf.value == pytest.approx(3.805202, abs=1e-6)
+    assert len(branch.points["Hopf"]) == 2
+
+
 def test_folds_and_hopf_points_of_jansen_and_rit() -> None:
     """Hopf points by Hurwitz' determinant; the neutral saddle at p = 96.762 is no bifurcation."""
     branch = sc.follow(sc.equilibrium(jansen_rit()), "p", to=400)

@@ -55,4 +55,6 @@ def test_junctions_a_whole_turn_apart_are_synchronous() -> None:
 def test_junctions_that_repel_each_other_follow_at_a_third_of_a_period() -> None:
     push = sc.Rates({"w": "-K*W*sin(phi_j - phi_i)"}, {"K": 0.2})
     scene = sc.Scene(junction(1.0), push, sc.graphs.ring(3), transient=200, initial={"phi": [0, 2, 4]})
-    assert sc.periodic_orbit(scene).pattern.startswith("travelling wave: each node moves as the one before it, 1/3 of a")
+    assert sc.periodic_orbit(scene).pattern.startswith(
+        "travelling wave: each node moves as the one before it, 1/3 of a"
+    )
