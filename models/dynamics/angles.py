@@ -6,7 +6,6 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import lru_cache
 
-import numpy as np
 import sympy as sp
 
 from .equations import Equations
@@ -60,15 +59,6 @@ def periods_of_states(equations: Equations) -> Periods:
     for kind, places in zip(equations.kind_of, equations.places, strict=True):
         periods.update(zip(places, by_kind[kind], strict=True))
     return tuple(periods[slot] for slot in range(equations.dimension))
-
-
-def whole_turns(periods: Periods, differences: np.ndarray) -> np.ndarray:
-    """Return the whole turns in differences (…, states) of states; 0 for states that are no angles."""
-    turns = np.zeros_like(differences)
-    for place, period in enumerate(periods[: differences.shape[-1]]):
-        if period is not None:
-            turns[..., place] = period * np.round(differences[..., place] / period)
-    return turns
 
 
 def _occurrences(

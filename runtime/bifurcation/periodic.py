@@ -22,7 +22,7 @@ from numbers import Integral, Real
 import numpy as np
 from scipy.optimize import brentq
 
-from synchain.models.dynamics.angles import periods_of_states, whole_turns
+from synchain.models.dynamics.angles import periods_of_states
 from synchain.models.dynamics.reduction import NoQuotient, quotient
 from synchain.models.dynamics.synchrony import NoSynchrony
 from synchain.models.inputs.checks import check_number, is_row, short_repr
@@ -30,7 +30,7 @@ from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.run_keywords import Given
 from ..stability.limit_cycle import APART, NEAR, RETURNS, returns
-from ..stability.motion import rests, turns_of
+from ..stability.motion import rests, turns_of, whole_turns
 from ..sweeps.continued_start import StartValue, started
 from .arclength import Point
 from .cycles import Cycles, quotient_of

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 import numpy as np
 import xarray as xr
 
-from synchain.models.dynamics.angles import periods_of_states, whole_turns
+from synchain.models.dynamics.angles import periods_of_states
 from synchain.models.scenes.scene import Scene
 
 from ..results.labelled import Labelled, dataset, scene_text
 from ..results.labels import STATE, States
 from ..stability.attractor import cycle_propagators
 from ..stability.exponents import with_partner
-from ..stability.motion import Turns
+from ..stability.motion import Turns, whole_turns
 from ..stability.orbits import OrbitProblem, unit_of_time
 from .flow import TOLERANCE, flow_of
 from .phases import Phases, phases_of

@@ -19,7 +19,7 @@ from numbers import Integral
 
 import numpy as np
 
-from synchain.models.dynamics.angles import periods_of_states, whole_turns
+from synchain.models.dynamics.angles import periods_of_states
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import check_keys, check_number, check_seed, check_table, short_repr
 from synchain.models.inputs.frozen import FrozenDict
@@ -27,6 +27,7 @@ from synchain.models.scenes.defaults import TimeUnit
 from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.run_keywords import Given, chosen, with_numbers
+from ..stability.motion import whole_turns
 from ..stability.orbits import OrbitProblem, driven_states, within
 from ..support.arrays import row
 from ..support.execution import Execution

@@ -18,7 +18,7 @@ import numpy as np
 import sympy as sp
 
 from synchain.codegen.driver.columns import Control
-from synchain.models.dynamics.angles import periods_of_states, whole_turns
+from synchain.models.dynamics.angles import Periods, periods_of_states
 from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.keywords import warn
 from synchain.models.mechanics.components import TIME, Edge, Node
@@ -182,6 +182,15 @@ class Turns(NamedTuple):
     def __str__(self) -> str:
         """Return the meaning and the length of the unit of time."""
         return f"{self.label}, {self.time:.6g} units of time"
+
+
+def whole_turns(periods: Periods, differences: np.ndarray) -> np.ndarray:
+    """Return the whole turns in differences (…, states) of states; 0 for states that are no angles."""
+    turns = np.zeros_like(differences)
+    for place, period in enumerate(periods[: differences.shape[-1]]):
+        if period is not None:
+            turns[..., place] = period * np.round(differences[..., place] / period)
+    return turns
 
 
 def rates_of(equations: Equations, parameters: dict[str, float]) -> RateFunctions:
