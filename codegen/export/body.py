@@ -26,17 +26,11 @@ from ..program.lowering import Library, number
 from ..program.passes import real
 from ..program.statements import Statement, let
 
+# Largest number of nodes of a network that is written node by node. A choice: 8 nodes fill a page of text.
 LARGEST_UNROLLED = 8
-"""Largest number of nodes of a network that is written node by node.  A choice: 8 nodes fill a page of text."""
-
-LINE = 110
-"""Largest width of the lines of a table, in columns."""
-
-Linked: TypeAlias = tuple[Link, Edge]
-"""A link and its template."""
-
-lower = Library()
-"""Translates SymPy expressions for exported languages, all of which have a mathematical library."""
+LINE = 110  # largest width of the lines of a table, in columns
+Linked: TypeAlias = tuple[Link, Edge]  # a link and its template
+lower = Library()  # translates SymPy expressions for exported languages, all of which have a mathematical library
 
 
 class Entry(NamedTuple):
@@ -47,8 +41,8 @@ class Entry(NamedTuple):
     source: bool = False
 
 
+# Returns the statement that stores a value at a component of the state, or at an `Entry`.
 Storing: TypeAlias = Callable[[Any, Expression], Statement]
-"""Returns the statement that stores a value at a component of the state, or at an `Entry`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ ARGUMENTS = "double t, const double *state, const double *numbers, double *"
 SIGN = ["static double sign(double x)", "{", "    return (double)((x > 0.0) - (x < 0.0));", "}", ""]
 
 
+# C text that solves a dense system of DIMENSION equations in place, for several right-hand sides.
 SOLVE = """static void solve(double *mass, double *right, int columns)
 {
     for (int k = 0; k < DIMENSION; k++) { /* Gaussian elimination with row exchanges */
@@ -49,7 +50,6 @@ SOLVE = """static void solve(double *mass, double *right, int columns)
         }
 }
 """
-"""C text that solves a dense system of DIMENSION equations in place, for several right-hand sides."""
 
 USE = """
 rhs writes d(state)/dt to rates; state and rates have DIMENSION numbers, numbers has PARAMETERS."""

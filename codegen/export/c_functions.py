@@ -11,6 +11,7 @@ import ast
 import textwrap
 from collections.abc import Iterable, Iterator
 
+# The declaration of an argument or function for each annotation.
 TYPES = {
     "float": "double {}",
     "int": "int {}",
@@ -18,10 +19,9 @@ TYPES = {
     "Doubles": "double *{}",
     "Seen": "void (*{})(double, int, double, double)",
 }
-"""The declaration of an argument or function for each annotation."""
 
+# Functions with other names in C.
 NAMES = {"max": "fmax", "min": "fmin", "abs": "fabs", "slopes": "rhs", "sqrt": "sqrt"}
-"""Functions with other names in C."""
 
 SIGNS: dict[type, str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/", ast.Mod: "%", ast.Lt: "<", ast.LtE: "<=",
@@ -30,8 +30,8 @@ SIGNS: dict[type, str] = {
 }  # fmt: skip
 
 
+# How tightly an expression binds; choices, `and` and `or` within others always get parentheses.
 CHOICE, COMPARISON, SUM, TERM, UNARY = range(5)
-"""How tightly an expression binds; choices, `and` and `or` within others always get parentheses."""
 
 
 def in_c(source: str, constants: Iterable[str]) -> list[str]:

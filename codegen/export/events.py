@@ -19,13 +19,11 @@ from ..program.statements import Statement, Store, Titled
 from . import event_text
 from .body import ExportBody, is_unrolled, wrapped
 
-LAWS = {Law.SIGN: 0, Law.STOP: 1, Law.RESET: 2}
-"""The numbers of laws in the text."""
+LAWS = {Law.SIGN: 0, Law.STOP: 1, Law.RESET: 2}  # the numbers of laws in the text
 
 MARK = "# --- exported text below ---\n"
 
-Part = tuple[int, tuple[Row, ...]]
-"""A node and its rows, in the symbols of the network."""
+Part = tuple[int, tuple[Row, ...]]  # a node and its rows, in the symbols of the network
 
 
 def has_events(model: Equations) -> bool:

@@ -12,8 +12,7 @@ from .body import check_inertia
 from .events import without_events
 from .portable_names import portable
 
-SHOWN = 12
-"""Largest number of states that are all listed; of more, only the first and the last are listed."""
+SHOWN = 12  # largest number of states that are all listed; of more, only the first and the last are listed
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,8 +35,7 @@ from .body import (
     node_rhs,
 )
 
-Index: TypeAlias = Callable[[int], Expression]
-"""Returns the index of a component in the state."""
+Index: TypeAlias = Callable[[int], Expression]  # returns the index of a component in the state
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,14 +29,10 @@ _OWN = """np math types cfunc carray csc_matrix lsoda_sig address rhs jac jacobi
 numbers matrix mass_ solve right_ values sign i_ j_ k_ link_ weight_ NODES DIMENSION PARAMETERS LINKS ENTRIES TARGET SOURCE
 WEIGHT NUMBER ROWS COLUMNS STATE NODE HEAVY defaults memset
 rows_"""
+# Names used by the languages, their mathematical libraries or the exported text; a symbol of this name is renamed.
 RESERVED = {*f"{_C} {_MATH} {_OWN}".split(), *keyword.kwlist, *keyword.softkwlist, *dir(builtins)}
-"""Names used by the languages, their mathematical libraries or the exported text; a symbol of this name is renamed."""
-
-_MACRO = re.compile(r"(M|FP|MATH)_\w+")
-"""Matches macros of C's mathematical library."""
-
-_LATER = re.compile(r"w[0-9]+|rate_[ij][0-9]+|mass_[0-9]+_")
-"""Matches numbered names of the exported text."""
+_MACRO = re.compile(r"(M|FP|MATH)_\w+")  # matches macros of C's mathematical library
+_LATER = re.compile(r"w[0-9]+|rate_[ij][0-9]+|mass_[0-9]+_")  # matches numbered names of the exported text
 
 
 def portable(equations: Equations) -> tuple[Equations, dict[str, str]]:

@@ -9,8 +9,8 @@ from typing import Any
 import numba
 from numba.core.compiler import Compiler
 
+# Reasons for which Numba's own pipeline compiled functions of this process, one per function.
 front_end_problems: list[str] = []
-"""Reasons for which Numba's own pipeline compiled functions of this process, one per function."""
 
 
 def uses_front_end() -> bool:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import ast
 from typing import Any
 
+# Name of the global variable with the syntax trees of a module's functions, by first line (`code.co_firstlineno`).
 TREES = "__syntax__"
-"""Name of the global variable with the syntax trees of a module's functions, by first line (`code.co_firstlineno`)."""
 
 
 def functions(tree: ast.Module) -> dict[int, ast.FunctionDef]:

@@ -21,11 +21,9 @@ __all__ = ["Integrator", "IntegratorKind", "integrator", "names"]
 
 Row = tuple[float, ...]
 
-GROUP = "synchain.integrators"
-"""The group of entry points of integrators."""
-
+GROUP = "synchain.integrators"  # the group of entry points of integrators
+# The names that the module of an integrator with stages must have.
 NEEDED = ("KIND", "ORDER", "ERROR_ORDER", "DENSE_ORDER", "SOURCE", "A", "B", "C", "E", "DENSE")
-"""The names that the module of an integrator with stages must have."""
 
 
 class IntegratorKind(StrEnum):
@@ -33,8 +31,7 @@ class IntegratorKind(StrEnum):
 
     ROSENBROCK = "rosenbrock"
     EXPLICIT = "explicit"
-    TAYLOR = "taylor"
-    """The power series of the solution, from recurrences."""
+    TAYLOR = "taylor"  # The power series of the solution, from recurrences
 
 
 @dataclass(frozen=True, slots=True)

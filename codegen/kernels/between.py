@@ -14,11 +14,10 @@ from synchain.models.mechanics.jumps import JUMPING, KINKED, gaps_of
 
 from .rounding import magnitude
 
+# Rounding error of a value relative to its `magnitude`; codegen/recorders/crossings.py uses the same number.
 NOISE = sp.Rational(3, 2) / 10**14
-"""Rounding error of a value relative to its `magnitude`; codegen/recorders/crossings.py uses the same number."""
-
+# Functions f with f(u) or 1/f(u) constant up to a term of the order exp(-|u|) for large |u|.
 SATURATING = (sp.tanh, sp.erf, sp.cosh)
-"""Functions f with f(u) or 1/f(u) constant up to a term of the order exp(-|u|) for large |u|."""
 
 
 def gaps_in(values: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:

@@ -23,17 +23,18 @@ class KernelKind(StrEnum):
     FRAME = "frame"
 
 
+# Name of the function that runs cells, orbits or directions.
 ENTRIES = {KernelKind.SWEEP: "drive", KernelKind.MODES: "march", KernelKind.FRAME: "drive_frame"}
-"""Name of the function that runs cells, orbits or directions."""
 
+# Ends of the groups of arrays that an entry takes as tuples.
 GROUPS = {
     KernelKind.SWEEP: (0, 4, 10),  # input, output
     KernelKind.MODES: (0, 4, 7, 10, 21, 23),  # input, deviations, output, propagation, framing
     KernelKind.FRAME: (0, 4, 10, 18),  # input, output, framing
 }
-"""Ends of the groups of arrays that an entry takes as tuples."""
 
 
+# Recorders in the order of the arguments of a driver of sweeps, each with the files that its text consists of.
 RECORDERS = {
     "halt": ("driver.dense", "recorders.panels", "recorders.crossings", "recorders.halting"),
     "observe": ("driver.dense", "driver.spread", "recorders.comparing"),
@@ -41,7 +42,6 @@ RECORDERS = {
     "tally": ("recorders.panels", "recorders.observing"),
     "sample": ("driver.dense", "recorders.sampling"),
 }
-"""Recorders in the order of the arguments of a driver of sweeps, each with the files that its text consists of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,11 +143,10 @@ def common_drivers() -> list[Driver | Recorder]:
     return list(dict.fromkeys([*sweeps, *modes, *recorders]))
 
 
+# Names of the records that the text of a driver may construct.
 RECORDS = {name for name, value in vars(records).items() if isinstance(value, type) and issubclass(value, tuple)}
-"""Names of the records that the text of a driver may construct."""
-
+# Matches a string, a comment or a name. The group holds a name that is not an attribute.
 WORDS = re.compile(r'"""(?:.|\n)*?"""|"[^"\n]*"|\'[^\'\n]*\'|#[^\n]*|(?<![\w.])([A-Za-z_]\w*)')
-"""Matches a string, a comment or a name. The group holds a name that is not an attribute."""
 
 
 def imports(text: str) -> str:

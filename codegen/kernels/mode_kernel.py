@@ -38,11 +38,8 @@ from .driver import Driver, KernelKind
 from .kernel_text import KernelSource, NamedEquations, describe, module
 from .sweep_kernel import AUTO, node_functions
 
-LARGEST_ORBIT = 32
-"""Most nodes of an orbit; compilation takes about a second of CPU time for each (a choice)."""
-
-HEAD = 3
-"""Number of entries at the beginning of the shared array: rate = 1/h, shift = 1/(gamma h), reach = gamma h."""
+LARGEST_ORBIT = 32  # most nodes of an orbit; compilation takes about a second of CPU time for each (a choice)
+HEAD = 3  # number of entries at the beginning of the shared array: rate = 1/h, shift = 1/(gamma h), reach = gamma h
 
 CARRY = '''
 @njit(error_model='numpy', cache=True)
@@ -61,8 +58,7 @@ def carry(shared, strengths, old, new, first, last, tolerance):
     return largest
 '''.strip()
 
-Place = tuple[int, int]
-"""Row and column of an entry of the Jacobian A."""
+Place = tuple[int, int]  # row and column of an entry of the Jacobian A
 
 
 @dataclass(frozen=True, slots=True)

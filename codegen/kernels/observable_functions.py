@@ -36,11 +36,9 @@ from .between import calmed, depths_in, gaps_in, settled
 from .kernel_text import NamedEquations
 from .rounding import magnitude
 
-LARGEST = 1.7976931348623157e308
-"""Largest finite double-precision number."""
-
+LARGEST = 1.7976931348623157e308  # largest finite double-precision number
+# Initial value of the loop of each reduction.
 BEGINS = {NodeSum: 0.0, NodeMean: 0.0, NodeMaximum: -LARGEST, NodeMinimum: LARGEST}
-"""Initial value of the loop of each reduction."""
 
 
 def rule_of(method: Integrator) -> tuple[tuple[float, ...], ...]:
@@ -207,8 +205,7 @@ def table_name(rows: int, number: int) -> str:
     return f"ROWS_{rows}_{number}"
 
 
-SYNC_ERROR = Recording()
-"""The synchronisation error, and no functions inside steps."""
+SYNC_ERROR = Recording()  # the synchronisation error, and no functions inside steps
 
 
 class _LoopWriter:

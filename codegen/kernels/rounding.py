@@ -7,8 +7,8 @@ import sympy as sp
 from synchain.models.dynamics.observable import AtNode, NodeMaximum, NodeMean, NodeMinimum, NodeSum, Rate, RowSum
 from synchain.models.mechanics.jumps import JUMPING
 
+# Functions that grow at most like a logarithm: the rounding error of a large argument adds at most 1 to the size.
 LEVEL = (sp.acos, sp.acosh, sp.asin, sp.asinh, sp.atan, sp.atan2, sp.atanh, sp.erf, sp.log, sp.tanh)
-"""Functions that grow at most like a logarithm: the rounding error of a large argument adds at most 1 to the size."""
 
 
 def magnitude(e: sp.Expr) -> sp.Expr:

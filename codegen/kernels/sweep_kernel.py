@@ -45,11 +45,9 @@ from .driver import RECORDERS, Driver, KernelKind, Recorder
 from .kernel_text import KernelSource, NamedEquations, describe, module
 from .observable_functions import SYNC_ERROR, Recording, count_of, rule_of
 
-AUTO = "rodas5p"
-"""The integrator for "auto"."""
-
+AUTO = "rodas5p"  # the integrator for "auto"
+# Largest number of nodes whose steps are written out by default; steps of larger networks run in loops.
 LARGEST_UNROLLED = 8
-"""Largest number of nodes whose steps are written out by default; steps of larger networks run in loops."""
 
 LARGEST_UNROLLED_LIFT = 4
 """Largest number of nodes whose steps are written out if the nodes carry deviations (`lift.lifted`).
@@ -57,8 +55,7 @@ LARGEST_UNROLLED_LIFT = 4
 Measured on rings of 5 to 8 Stuart-Landau oscillators: loops compile 2 to 6 times faster and run as fast within 10 %.
 """
 
-MOST_OF_LINKS = 1000
-"""Largest number of operations of all links in a written-out step; more take minutes to compile."""
+MOST_OF_LINKS = 1000  # largest number of operations of all links in a written-out step; more take minutes to compile
 
 
 @dataclass(frozen=True, slots=True)

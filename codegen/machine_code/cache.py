@@ -32,17 +32,12 @@ try:
 except ImportError:  # Windows has no such locks
     fcntl = None  # type: ignore[assignment]
 
-DIGEST = hashlib.sha256().digest_size
-"""Bytes of a signature and of the key."""
-
+DIGEST = hashlib.sha256().digest_size  # bytes of a signature and of the key
+# Prefixes of file names: "kernel" for functions of a scene, "driver" for drivers and recorders, which scenes share.
 KINDS = ("kernel", "driver")
-"""Prefixes of file names: "kernel" for functions of a scene, "driver" for drivers and recorders, which scenes share."""
-
-KEY = "cache.key"
-"""Name of the file with the key that signs machine code."""
-
+KEY = "cache.key"  # name of the file with the key that signs machine code
+# Seconds for which a process waits while another process compiles the same module; compilation takes up to 10 s.
 LOCK_TIMEOUT = 120.0
-"""Seconds for which a process waits while another process compiles the same module; compilation takes up to 10 s."""
 
 
 def cache_folder() -> Path:
@@ -213,8 +208,7 @@ def open_folder(path: Path) -> Iterator[Folder]:
         os.close(descriptor)
 
 
-_warned_folders: set[Path] = set()
-"""The folders for which a warning of refused files was issued."""
+_warned_folders: set[Path] = set()  # the folders for which a warning of refused files was issued
 
 
 def _warn_of_refusal(folder: Path, problem: str) -> None:

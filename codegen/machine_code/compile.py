@@ -51,11 +51,9 @@ from .installation import InstallationError
 from .processor import processor
 from .signatures import recorder_signatures, signatures
 
-LOG = logging.getLogger(__name__)
-"""Reports at the level INFO each compilation, which takes seconds."""
-
+LOG = logging.getLogger(__name__)  # reports at the level INFO each compilation, which takes seconds
+# Held while a kernel is loaded or compiled. A fork waits for the lock: no child starts during a compilation.
 _lock = threading.RLock()
-"""Held while a kernel is loaded or compiled.  A fork waits for the lock: no child starts during a compilation."""
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_lock.release)
 
@@ -130,11 +128,10 @@ class Kernel:
 
 # -- kernels of this process -------------------------------------------------------------------------------------
 
+# The kernels of this process that are in use.
 _kernels: WeakValueDictionary[KernelSource, Kernel] = WeakValueDictionary()
-"""The kernels of this process that are in use."""
-
+# The functions of scenes that are in use, by their code.
 _modules: WeakValueDictionary[str, Compiled] = WeakValueDictionary()
-"""The functions of scenes that are in use, by their code."""
 
 
 def load(source: KernelSource) -> Kernel:
@@ -182,25 +179,21 @@ def _load(source: KernelSource) -> Kernel:
             kernel = _kernels[source] = _kernel(source)
             if problem := kernel.compiled.problem or kernel.driver.problem:
                 warn(f"kernels are not kept on disk: {problem}")
-            _warn_of_slowness()
+            # Warn, once per process, of settings that slow down compilation or kernels.
+            if decorator.front_end_problems:
+                _warn_once(
+                    "kernels: found a fault of the front end; expected none; Numba's own pipeline compiles with the same results "
+                    f"in 2 to 4 times the time ({decorator.front_end_problems[0]})"
+                )
+            if not has_fma():
+                _warn_once(
+                    f"kernels: found a processor without fused multiply-add ({processor().partition(':')[0]}); expected one; they take "
+                    "up to twice the time and round otherwise; unset NUMBA_CPU_NAME and NUMBA_CPU_FEATURES if they are set"
+                )
         return kernel
 
 
 _warn_once = functools.cache(warn)
-
-
-def _warn_of_slowness() -> None:
-    """Warn, once per process, of settings that slow down compilation or kernels."""
-    if decorator.front_end_problems:
-        _warn_once(
-            "kernels: found a fault of the front end; expected none; Numba's own pipeline compiles with the same results "
-            f"in 2 to 4 times the time ({decorator.front_end_problems[0]})"
-        )
-    if not has_fma():
-        _warn_once(
-            f"kernels: found a processor without fused multiply-add ({processor().partition(':')[0]}); expected one; they take "
-            "up to twice the time and round otherwise; unset NUMBA_CPU_NAME and NUMBA_CPU_FEATURES if they are set"
-        )
 
 
 @functools.cache  # a process needs few drivers and recorders, and keeps them
@@ -321,19 +314,19 @@ def _compile(text: str, path: Path, wanted: dict[str, Any], stored: bytes = b"")
 
 # -- the names of modules ----------------------------------------------------------------------------------------
 
+# The source files whose code becomes a part of machine code, besides the text of the module.
 SOURCES = [
     *sorted(path for file in (decorator.__file__, lane_types.__file__) for path in Path(file).parent.glob("*.py")),
     Path(dimensions.__file__),
     Path(records.__file__),
     Path(function_table.__file__),
 ]
-"""The source files whose code becomes a part of machine code, besides the text of the module."""
 
+# Settings of Numba (NUMBA_OPT … in the environment) that change machine code; `processor` has the others.
 FLAGS = (
     "BOUNDSCHECK", "DEBUG_JIT", "DEBUG_NRT", "DEBUG_NRT_STACK_LIMIT", "DEBUGINFO_DEFAULT", "DISABLE_INTEL_SVML",
     "ENABLE_PROFILING", "EXTEND_VARIABLE_LIFETIMES", "LLVM_REFPRUNE_FLAGS", "LLVM_REFPRUNE_PASS", "LOOP_VECTORIZE", "OPT", "SLP_VECTORIZE",
 )  # fmt: skip
-"""Settings of Numba (NUMBA_OPT … in the environment) that change machine code; `processor` has the others."""
 
 
 @functools.cache

@@ -21,12 +21,11 @@ from .function_table import FunctionsType
 NUMBER, INTEGER = types.float64, types.int64
 VECTOR, MATRIX, CUBE = NUMBER[::1], NUMBER[:, ::1], NUMBER[:, :, ::1]
 CELLS, COUNTS = INTEGER[::1], INTEGER[:, ::1]
+# Type of a matrix that a kernel only reads; callers may pass writable or read-only arrays.
 READ_ONLY = types.Array(NUMBER, 2, "C", readonly=True)
-"""Type of a matrix that a kernel only reads; callers may pass writable or read-only arrays."""
+# Links and elimination program of a step in loops (codegen/steps/safe_names.py), and the weights of its links.
 NETWORK = (types.UniTuple(CELLS, len(NAMES)), VECTOR)
-"""Links and elimination program of a step in loops (codegen/steps/safe_names.py), and the weights of its links."""
-ROWS = types.Tuple((READ_ONLY, READ_ONLY, READ_ONLY, VECTOR))
-"""Input of a driver: the fields of `Rows`."""
+ROWS = types.Tuple((READ_ONLY, READ_ONLY, READ_ONLY, VECTOR))  # input of a driver: the fields of `Rows`
 
 
 def _sizes(kind: type[Dimensions] | type[ModeDimensions]) -> Any:

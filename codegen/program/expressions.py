@@ -161,8 +161,7 @@ class Slice(Expression):
     stop: Expression
 
 
-Value: TypeAlias = Expression | float | int | str
-"""An expression, a number, or the name of a variable."""
+Value: TypeAlias = Expression | float | int | str  # an expression, a number, or the name of a variable
 
 ZERO, ONE = Number(0.0), Number(1.0)
 

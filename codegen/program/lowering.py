@@ -35,8 +35,7 @@ from .expressions import (
 
 SIGNS = {sp.StrictLessThan: "<", sp.LessThan: "<=", sp.StrictGreaterThan: ">", sp.GreaterThan: ">="}
 
-LARGEST_POWER = 16
-"""Largest integer exponent for which lanes compute a power as a product. A choice."""
+LARGEST_POWER = 16  # largest integer exponent for which lanes compute a power as a product. A choice.
 
 
 class UnprintableError(ValueError):
@@ -181,8 +180,7 @@ class Library(Lowering):
         return PowerExpr(self(base), Number(int(exponent)) if exponent.is_Integer else self(exponent))
 
 
-lower = Lowering()
-"""Translates a SymPy expression to an expression for lanes."""
+lower = Lowering()  # translates a SymPy expression to an expression for lanes
 
 
 def number(e: sp.Expr | Fraction) -> Number:

@@ -48,14 +48,11 @@ from .statements import (
     Titled,
 )
 
+# Precedence levels of a piece of text, from the loosest (a sum) to the tightest (a name or a call).
 SUM, TERM, POWER, ATOM = range(4)
-"""Precedence levels of a piece of text, from the loosest (a sum) to the tightest (a name or a call)."""
-
-WIDEST = 110
-"""Largest width of an assignment on one line; longer assignments of lanes are broken into lines. A choice."""
-
+WIDEST = 110  # largest width of an assignment on one line; longer assignments of lanes are broken into lines. A choice.
+# Options of `njit` for each role of a function.
 OPTIONS = {Role.INLINED: ", forceinline=True", Role.CALLED: "", Role.ENTRY: ", cache=True"}
-"""Options of `njit` for each role of a function."""
 
 
 class Printer:

@@ -19,8 +19,7 @@ class Assign:
     whole: bool = False
 
 
-Index: TypeAlias = Expression | tuple[Expression, Expression]
-"""The index of an element, or its row and column."""
+Index: TypeAlias = Expression | tuple[Expression, Expression]  # the index of an element, or its row and column
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,11 +14,9 @@ from flint import acb, arb, ctx, fmpq, fmpz
 
 from .rationals import to_flint
 
-Ball: TypeAlias = Any
-"""flint.arb if the number is real, flint.acb if it is complex (flint has no types)."""
-
+Ball: TypeAlias = Any  # flint.arb if the number is real, flint.acb if it is complex (flint has no types)
+# Largest working precision in bits of `accurate`; ValueError if a ball of this precision still contains 0.
 _MOST = 2**20
-"""Largest working precision in bits of `accurate`; ValueError if a ball of this precision still contains 0."""
 
 
 @contextmanager

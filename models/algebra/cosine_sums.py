@@ -24,8 +24,7 @@ from .balls import Ball, precision
 from .lazy import LazyEigenvalues
 from .rationals import to_flint, to_fraction, to_sympy
 
-_HUGE = 10**300
-"""`near` returns infinity for rational numbers above this bound; the largest float is 1.8e308."""
+_HUGE = 10**300  # `near` returns infinity for rational numbers above this bound; the largest float is 1.8e308
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,8 +142,8 @@ def folded_sum(shift: Fraction, parts: Iterable[tuple[int, Fraction]], unit: int
     return AngleSum(shift, tuple(sorted((t, b) for t, b in counts.items() if b)))
 
 
+# Denominator of t -> 2 cos(2πt), for all t with a rational cosine (Niven's theorem).
 _RATIONAL = {1: 2, 2: -2, 3: -1, 4: 0, 6: 1}
-"""Denominator of t -> 2 cos(2πt), for all t with a rational cosine (Niven's theorem)."""
 
 
 def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]]:

@@ -16,6 +16,7 @@ from flint import fmpq, fmpq_poly, fmpz_poly
 
 from .rationals import to_flint, to_fraction, to_sympy
 
+# 2 cos(2πk/m) as text for SymPy, by (k, m) in lowest terms.
 _SHORT = {
     (0, 1): "2", (1, 2): "-2", (1, 3): "-1", (1, 4): "0", (1, 6): "1",
     (1, 5): "-1/2 + sqrt(5)/2", (2, 5): "-1/2 - sqrt(5)/2",
@@ -28,7 +29,6 @@ _SHORT = {
     (1, 24): "sqrt(6)/2 + sqrt(2)/2", (5, 24): "sqrt(6)/2 - sqrt(2)/2",
     (7, 24): "sqrt(2)/2 - sqrt(6)/2", (11, 24): "-sqrt(6)/2 - sqrt(2)/2",
 }  # fmt: skip
-"""2 cos(2πk/m) as text for SymPy, by (k, m) in lowest terms."""
 
 
 def is_short(k: int, m: int) -> bool:

@@ -21,11 +21,9 @@ from flint import acb, arb
 from .balls import Ball, enclose, precision
 from .roots import Root
 
+# Expressions of rationals, roots, I, sin and cos of rational multiples of pi, exp of rational multiples of I*pi.
 Number: TypeAlias = sp.Expr | Root
-"""Expressions of rationals, roots, I, sin and cos of rational multiples of pi, exp of rational multiples of I*pi."""
-
-MOST_BITS = 2**19
-"""Largest precision of a comparison in bits; numbers that need more raise an error."""
+MOST_BITS = 2**19  # largest precision of a comparison in bits; numbers that need more raise an error
 
 
 @dataclass(slots=True)

@@ -19,14 +19,11 @@ from flint import acb, acb_poly, arb, arb_poly, fmpq, fmpz, fmpz_poly
 
 from .balls import Ball, disjoint, precision
 
+# Aberth's method stops after this many steps without a newly converged root; 10 and 70 suffice in tests.
 _IDLE = {arb: 30, acb: 200}
-"""Aberth's method stops after this many steps without a newly converged root; 10 and 70 suffice in tests."""
-_DIGITS = 2.0**-44
-"""Relative step size below which a root has converged in floats; Newton's method in balls follows."""
-_SHARP = 160
-"""Relative accuracy of the discs in bits."""
-_LARGE = 900.0
-"""Start radii must lie between 2**-_LARGE and 2**_LARGE, so that no float overflows."""
+_DIGITS = 2.0**-44  # relative step size below which a root has converged in floats; Newton's method in balls follows
+_SHARP = 160  # relative accuracy of the discs in bits
+_LARGE = 900.0  # start radii must lie between 2**-_LARGE and 2**_LARGE, so that no float overflows
 
 
 @dataclass(frozen=True, slots=True)

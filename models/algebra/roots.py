@@ -24,13 +24,12 @@ from .balls import Ball, nearest, precision
 from .isolation import Disc, discs, dyadic, sharpened, sign
 from .rationals import to_flint, to_fraction
 
+# Integer coefficients, constant first, of an irreducible primitive polynomial; the leading one is positive.
 Polynomial = tuple[int, ...]
-"""Integer coefficients, constant first, of an irreducible primitive polynomial; the leading one is positive."""
 
 _X = sp.Symbol("x")
 
-_WRITTEN = 14_000
-"""Longest integer, in bits, that Python converts to and from decimal text by default (4300 digits)."""
+_WRITTEN = 14_000  # longest integer, in bits, that Python converts to and from decimal text by default (4300 digits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,8 +237,12 @@ def complex_order(polynomial: tuple[int, ...], upper: Sequence[acb]) -> list[int
     bound = 2 * max(Fraction(c, coefficients[0]) for c in coefficients)
     shrink = acb(to_flint(1 / scale))
     boxes = _leaves({k: ball * shrink for k, ball in enumerate(upper)}, (-bound, Fraction(0), bound, bound))
-    if boxes is None:  # a root on the border of a box
-        return _ask_sympy(as_sympy, upper)
+    if boxes is None:
+        # SymPy's own isolation: slow, but exact for a root on the border of a box.
+        centres = [complex(float(ball.real.mid()), float(ball.imag.mid())) for ball in upper]
+        first = as_sympy.degree() - 2 * len(upper)
+        values = [complex(sp.CRootOf(as_sympy, first + 2 * i + 1).evalf(20)) for i in range(len(upper))]
+        return [min(range(len(centres)), key=lambda k: abs(centres[k] - value)) for value in values]
     return [k for _, k in sorted(boxes)]
 
 
@@ -271,11 +274,3 @@ def _leaves(
         )
         boxes += [(part, half) for part, half in zip((first, second), halves, strict=True) if part]
     return corners
-
-
-def _ask_sympy(polynomial: sp.Poly, upper: Sequence[acb]) -> list[int]:
-    """Compute `complex_order` from SymPy's own isolation: slow, but exact for a root on the border of a box."""
-    centres = [complex(float(ball.real.mid()), float(ball.imag.mid())) for ball in upper]
-    first = polynomial.degree() - 2 * len(upper)
-    values = [complex(sp.CRootOf(polynomial, first + 2 * i + 1).evalf(20)) for i in range(len(upper))]
-    return [min(range(len(centres)), key=lambda k: abs(centres[k] - value)) for value in values]

@@ -19,11 +19,9 @@ from ..algebra.rationals import to_fraction
 from ..inputs.reader import Algebra, Arithmetic, NoMeaning, ParsedText, parse
 from .number_text import DEPTH, LENGTH
 
+# Most cosines of a sum, and highest power; both are choices, since SymPy is faster for longer products.
 TERMS, POWER = 16, 4
-"""Most cosines of a sum, and highest power; both are choices, since SymPy is faster for longer products."""
-
-LARGEST = 10**10
-"""Bound for integers and for denominators of angles, a choice that keeps sums of 16 cosines short."""
+LARGEST = 10**10  # bound for integers and for denominators of angles, a choice that keeps sums of 16 cosines short
 
 _CIRCULAR = re.compile(r"[0-9A-Za-z_+\-*/() \t]*\b(?:sin|cos)\([0-9A-Za-z_+\-*/() \t]*", re.ASCII)
 _PI = fmpq_poly([0, 1])

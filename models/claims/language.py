@@ -30,8 +30,8 @@ from .cosine_text import cosine_sum
 from .number_text import exact_number, whole_number
 from .parts import LARGEST, WORDS, PartClaim, interval, is_part, read_part
 
+# Largest file in bytes, and most eigenvalues of a line, counted with multiplicity: choices for seconds of work.
 BYTES, REPETITIONS = 1_000_000, 100_000
-"""Largest file in bytes, and most eigenvalues of a line, counted with multiplicity: choices for seconds of work."""
 
 _OPTIONS = r"((?:\s+[A-Za-z_]\w*=\S+)*)"
 _RANGE = re.compile(r"(\w+)\s+n\s*=\s*([0-9]{1,6})\s*\.\.\s*([0-9]{1,6})" + _OPTIONS)

@@ -19,15 +19,14 @@ import sympy as sp
 from ..algebra.equality import check_size, equal
 from ..inputs.reader import Algebra, Arithmetic, NoMeaning, parse, stray_character
 
+# Limits, chosen so that reading a number takes less than a second: characters, nested operations, digits of a literal,
+# bits of a value.
 LENGTH, DEPTH, DIGITS, BITS = 300, 24, 30, 20_000
-"""Limits, chosen so that reading a number takes less than a second: characters, nested operations, digits of a
-literal, bits of a value.
-"""
 
 GRAMMAR = "whole numbers, + - * / **, parentheses, sqrt, I, and sin cos exp of rational multiples of pi"
 
+# Replaces pi in arguments of sin, cos and exp, so that SymPy evaluates them only after the angle is reduced.
 _PI = sp.Dummy("pi", real=True)
-"""Replaces pi in arguments of sin, cos and exp, so that SymPy evaluates them only after the angle is reduced."""
 
 _DECIMAL = re.compile(r"(?<![A-Za-z_])(?:[0-9]+\.[0-9]*|\.[0-9]+|[0-9]+(?=[eE][+-]?[0-9]))(?:[eE][+-]?[0-9]+)?")
 

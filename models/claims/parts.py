@@ -39,8 +39,8 @@ from ..spectra.spectrum import Spectrum
 from .cosine_text import cosine_sum
 from .number_text import exact_number
 
+# Most nodes of a graph whose spectrum is proved here, a choice: proofs of larger closed forms take seconds.
 LARGEST = 500
-"""Most nodes of a graph whose spectrum is proved here, a choice: proofs of larger closed forms take seconds."""
 
 LISTED = 5000
 """Most nodes of a graph whose eigenvalues are listed, a choice (a few seconds).

@@ -19,14 +19,14 @@ from .topology import Topology
 
 __all__ = ["NODE", "ClosedForm", "D", "J", "K", "M", "N", "P", "Q", "Term", "closed_form", "entries", "formulas"]
 
+# n: nodes; k, j: indices of eigenvalues; p, q: sizes of directions or groups; d: dimension; m: number of an
+# eigenvector; i: number of a node, from 0.
 N, K, J, P, Q, D, M, NODE = sp.symbols("n k j p q d m i", integer=True, nonnegative=True)
-"""n: nodes; k, j: indices of eigenvalues; p, q: sizes of directions or groups; d: dimension;
-m: number of an eigenvector; i: number of a node, from 0."""
 
 Index = tuple[sp.Symbol, sp.Expr, sp.Expr]
 
+# A whole number or a letter, except i (the node) and x (the separator of sizes, as in pxq).
 _ENTRY = re.compile(r"[0-9]{1,9}|[a-hj-wyz][0-9]?")
-"""A whole number or a letter, except i (the node) and x (the separator of sizes, as in pxq)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ __all__ = ["TOPOLOGY", "Eigenvalues", "Family", "FamilyRule", "family", "names",
 Edges: TypeAlias = "Callable[..., Iterable[tuple[int, int, int | str | Fraction]]]"
 Eigenvalues: TypeAlias = "Sequence[tuple[sp.Expr | int, int]] | None"
 
+# Graph families: the files of the folder `topologies`.
 TOPOLOGY = PluginKind(
     "topology",
     "topologies",
@@ -55,7 +56,6 @@ TOPOLOGY = PluginKind(
         "turan": "complete_multipartite",
     },
 )
-"""Graph families: the files of the folder `topologies`."""
 
 
 class _Signature:

@@ -21,17 +21,10 @@ if TYPE_CHECKING:
 
 V = TypeVar("V")
 
-LENGTH, DEPTH = 300, 8
-"""Most characters of a text, and most nested operations; both are choices."""
-
-LARGEST = 1_000_000
-"""Most nodes of a graph whose name `checked_name` reads, a choice."""
-
-PAIRS = ("cartesian", "kronecker", "union")
-"""Operations on two graphs or on two closed forms."""
-
-SIZED = ("complement", "weighted")
-"""Operations on one graph; none has a closed form without sizes."""
+LENGTH, DEPTH = 300, 8  # most characters of a text, and most nested operations; both are choices
+LARGEST = 1_000_000  # most nodes of a graph whose name `checked_name` reads, a choice
+PAIRS = ("cartesian", "kronecker", "union")  # operations on two graphs or on two closed forms
+SIZED = ("complement", "weighted")  # operations on one graph; none has a closed form without sizes
 
 
 def is_composed(text: str) -> bool:

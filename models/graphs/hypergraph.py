@@ -11,8 +11,7 @@ from ..inputs.checks import check_integer, short_repr, typed_repr
 from ..inputs.rational_text import rational
 from .topology import Topology
 
-Triangle = tuple[int, int, int, Fraction]
-"""Three nodes i < j < k, counted from 0, and the weight of their triangle."""
+Triangle = tuple[int, int, int, Fraction]  # three nodes i < j < k, counted from 0, and the weight of their triangle
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)

@@ -8,11 +8,9 @@ from fractions import Fraction
 from itertools import islice
 from typing import TypeAlias
 
-LINK_LIMIT = 4_000_000
-"""Most links of a graph, a choice: 4 million tuples take about 600 MB in Python."""
-
+LINK_LIMIT = 4_000_000  # most links of a graph, a choice: 4 million tuples take about 600 MB in Python
+# (target, source, weight): node `target` feels node `source`; indices start at 0.
 Link: TypeAlias = tuple[int, int, Fraction]
-"""(target, source, weight): node `target` feels node `source`; indices start at 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +39,7 @@ class AllPairs:
         return tuple(islice(self._all(), count))
 
 
-Links: TypeAlias = tuple[Link, ...] | AllPairs
-"""Links as a tuple, or the links between all pairs of nodes."""
+Links: TypeAlias = tuple[Link, ...] | AllPairs  # links as a tuple, or the links between all pairs of nodes
 
 
 def one_degree(n: int, links: Iterable[Link]) -> Fraction | None:

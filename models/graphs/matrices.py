@@ -68,17 +68,13 @@ class Exact:
 class MatrixKind(StrEnum):
     """Matrices of a graph: W holds the weights with which node i (row) feels node j (column), D the row sums of W."""
 
-    ADJACENCY = "adjacency matrix"
-    """W."""
-    LAPLACIAN = "Laplacian"
-    """D - W, which is -G."""
-    SIGNLESS = "signless Laplacian"
-    """D + W; of undirected graphs."""
+    ADJACENCY = "adjacency matrix"  # W
+    LAPLACIAN = "Laplacian"  # D - W, which is -G
+    SIGNLESS = "signless Laplacian"  # D + W; of undirected graphs
+    # 1 - W/D, with a row of zeros for a node without links; of undirected graphs. The matrix is rational and similar to
+    # the normalised Laplacian L = 1 - D^(-1/2) W D^(-1/2), whose entries are square roots. Both have the same
+    # eigenvalues; v is an eigenvector of 1 - W/D if D^(1/2) v is one of L.
     RANDOM_WALK = "random-walk Laplacian"
-    """1 - W/D, with a row of zeros for a node without links; of undirected graphs.  The matrix is rational and
-    similar to the normalised Laplacian L = 1 - D^(-1/2) W D^(-1/2), whose entries are square roots.  Both have the
-    same eigenvalues; v is an eigenvector of 1 - W/D if D^(1/2) v is one of L.
-    """
 
 
 class GraphMatrices(Matrix, Protocol):

@@ -24,11 +24,10 @@ from ..inputs.reader import Algebra, NoMeaning, parse
 from ..spectra.symbolic_spectrum import SymbolicSpectrum, Z, symbolic_spectrum
 from .topology import Topology, from_matrix
 
+# Limits, all choices: nodes, characters of a weight, nested operations, exponent.
 LARGEST, LENGTH, DEPTH, EXPONENT = 30, 200, 20, 12
-"""Limits, all choices: nodes, characters of a weight, nested operations, exponent."""
-
+# Limits of an expanded weight, all choices: degree, number of terms, bits of a number.
 DEGREE, TERMS, BITS = 60, 2000, 10_000
-"""Limits of an expanded weight, all choices: degree, number of terms, bits of a number."""
 
 _LETTERS = re.compile(r"[A-Za-z0-9_+\-*/(). ]*", re.ASCII)
 _EXPECTED = "expected whole numbers, fractions, letters, + - * / **, e.g. a/2 or 1/(1+b)"

@@ -15,8 +15,8 @@ from typing import NoReturn
 
 from .reader import Algebra, NoMeaning, parse, stray_character, unpaired
 
+# Limits, choices far above the needs of a parameter: characters, nested operations, exponent, value.
 LENGTH, DEPTH, EXPONENT, MAGNITUDE = 200, 24, 100.0, 1e100
-"""Limits, choices far above the needs of a parameter: characters, nested operations, exponent, value."""
 
 FUNCTIONS: dict[str, Callable[[float], float]] = {
     "cos": math.cos,

@@ -21,8 +21,8 @@ from typing import Any, TypeGuard, TypeVar
 from .arithmetic import constant
 from .unsupported import unsupported
 
+# Control characters, line separators, changes of writing direction, and surrogates.
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
-"""Control characters, line separators, changes of writing direction, and surrogates."""
 
 
 def short_repr(value: object) -> str:
@@ -55,8 +55,7 @@ def suggestion(name: object, names: Iterable[str], other: Mapping[str, str] | No
     return f"; did you mean {targets[close[0]]!r}?" if close else ""
 
 
-_NUMBERED = re.compile(r"(.+?)((?:_\d+)+)")
-"""Names of variables of one node or link, such as a_2 or k_1_2."""
+_NUMBERED = re.compile(r"(.+?)((?:_\d+)+)")  # names of variables of one node or link, such as a_2 or k_1_2
 
 
 def listed(names: Iterable[str]) -> str:

@@ -12,16 +12,16 @@ import sympy as sp
 from .checks import short_repr, suggestion
 from .reader import Algebra, NoMeaning, ParsedText
 
+# Largest numeric exponent, and largest constant: choices that keep expressions short and doubles finite.
 EXPONENT, MAGNITUDE = 16, 1e100
-"""Largest numeric exponent, and largest constant: choices that keep expressions short and doubles finite."""
 
+# Name in text -> function that a model may call; generated code has the same functions.
 FUNCTIONS: Mapping[str, Any] = {
     "abs": sp.Abs, "acos": sp.acos, "acosh": sp.acosh, "asin": sp.asin, "asinh": sp.asinh, "atan": sp.atan,
     "atan2": sp.atan2, "atanh": sp.atanh, "ceiling": sp.ceiling, "cos": sp.cos, "cosh": sp.cosh, "erf": sp.erf,
     "exp": sp.exp, "floor": sp.floor, "log": sp.log, "max": sp.Max, "min": sp.Min, "sign": sp.sign, "sin": sp.sin, "sinh": sp.sinh,
     "sqrt": sp.sqrt, "tan": sp.tan, "tanh": sp.tanh,
 }  # fmt: skip
-"""Name in text -> function that a model may call; generated code has the same functions."""
 
 
 def _expm1(x: sp.Expr) -> sp.Expr:
@@ -79,11 +79,10 @@ def _modulo(x: sp.Expr, m: sp.Expr) -> sp.Expr:
     return x - m * sp.floor(x / m)
 
 
+# Further functions that text may call; each returns an expression of `FUNCTIONS`.
 COMPOSED: Mapping[str, Callable[..., sp.Expr]] = {"expm1": _expm1, "exprel": exprel, "log1p": _log1p, "mod": _modulo}
-"""Further functions that text may call; each returns an expression of `FUNCTIONS`."""
-
+# Number of arguments of functions that do not take exactly one; None means two or more.
 _COUNTS: Mapping[Any, int | None] = {sp.atan2: 2, _modulo: 2, sp.Max: None, sp.Min: None}
-"""Number of arguments of functions that do not take exactly one; None means two or more."""
 
 
 class _Refusal(Exception):

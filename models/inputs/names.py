@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
-_DIGITS = 9
-"""Most digits of the number of a node in a name."""
+_DIGITS = 9  # most digits of the number of a node in a name
 
+# Variables and coordinates of results.
 TAKEN = frozenset(
     {"atol_used", "cell", "component", "drive_phase", "end", "end_time", "ended_early", "event", "event_after", "event_before", "event_count",
      "event_impacts", "event_node", "event_resets", "event_row", "event_slips", "event_time", "integrator", "method_steps", "methods",
@@ -16,13 +16,12 @@ TAKEN = frozenset(
      "trajectory",
      "transversal_exponent", "transversal_stderr", "verdict"}
 )  # fmt: skip
-"""Variables and coordinates of results."""
 
+# Attributes of results and of their data; a variable with such a name would be hidden.
 ATTRIBUTES = frozenset(
     {"animate", "as_dict", "belongs_to", "data", "events", "integrators", "isel", "kind", "link", "message", "name", "names", "plot", "restore", "save", "scene",
      "sel", "state", "states", "stepped", "success", "summary", "to_dataframe", "to_xarray"}
 )  # fmt: skip
-"""Attributes of results and of their data; a variable with such a name would be hidden."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,7 @@ from .rational_text import rational
 
 Option: TypeAlias = int | str | tuple[int, ...]
 
-Options: TypeAlias = tuple[tuple[str, Option], ...]
-"""Names and values, sorted by name."""
+Options: TypeAlias = tuple[tuple[str, Option], ...]  # names and values, sorted by name
 
 _LIST = re.compile(r"[\s\d]+([,x][\s\d]+)+", re.ASCII)
 

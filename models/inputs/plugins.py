@@ -28,8 +28,7 @@ from typing import Any
 from .checks import check_path, check_text, short_repr, suggestion
 from .entry_points import announced
 
-PACKAGE = "synchain.models"
-"""The package whose folders contain the shipped plug-ins."""
+PACKAGE = "synchain.models"  # the package whose folders contain the shipped plug-ins
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +80,8 @@ class OwnFile(str):
         return OwnFile, self._key()
 
 
+# (kind, path, digest) -> module of a file outside the package; a scene keeps its model even if the file changes.
 _modules: dict[tuple[str, str, str], ModuleType] = {}
-"""(kind, path, digest) -> module of a file outside the package; a scene keeps its model even if the file changes."""
 
 _allowed: set[Path] = set()
 

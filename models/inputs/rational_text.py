@@ -14,10 +14,8 @@ from typing import Any
 
 from .checks import check_path, check_printable
 
-FILE_LIMIT = 32 * 2**20
-"""Largest matrix file in bytes, a choice."""
-ROWS = 2000
-"""Most rows of a matrix, a choice; larger graphs can be read as lists of edges."""
+FILE_LIMIT = 32 * 2**20  # largest matrix file in bytes, a choice
+ROWS = 2000  # most rows of a matrix, a choice; larger graphs can be read as lists of edges
 
 _TEXT = re.compile(r"[+-]?(?:\d+/0*[1-9]\d*|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)", re.ASCII)
 _BY_ZERO = re.compile(r"[+-]?\d+/0+", re.ASCII)

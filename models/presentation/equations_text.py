@@ -20,8 +20,7 @@ from ..mechanics.oscillator import FRICTION
 from ..mechanics.rows import Law, Row, Surface, in_signs, off_surfaces
 from .writer import ExpressionWriter, Latex, Style, Text
 
-LARGEST = 6
-"""Most nodes of a network written node by node, a choice; larger networks are written once, for node i."""
+LARGEST = 6  # most nodes of a network written node by node, a choice; larger networks are written once, for node i
 
 EXPECTED = "equations, such as scene.equations"
 

@@ -20,6 +20,7 @@ from .writer import LATEX_FUNCTIONS, VARIANTS, Latex
 
 TOKENS = re.compile(r"\\[A-Za-z]+|\\.|\d+(?:\.\d+)?|[A-Za-z]|\s+|.", re.DOTALL)
 
+# Operator in LaTeX -> character in MathML.
 SIGNS = {
     "\\cdot": "·",
     "\\dots": "…",
@@ -37,16 +38,11 @@ SIGNS = {
     "\\}": "}",
     "-": "−",
 }
-"""Operator in LaTeX -> character in MathML."""
 
+# Tokens without an element in MathML, which spaces operators itself.
 SPACES = ("\\left", "\\right", "\\:", "\\,", "\\;", "\\ ", "\\quad", "&")
-"""Tokens without an element in MathML, which spaces operators itself."""
-
-NO_BREAK = "\u00a0"
-"""A space that browsers keep even at the ends of a text."""
-
-GAP = '<mspace width="0.14em"/>'
-"""The space around a name of several letters in a product; its width is a choice."""
+NO_BREAK = "\u00a0"  # a space that browsers keep even at the ends of a text
+GAP = '<mspace width="0.14em"/>'  # the space around a name of several letters in a product; its width is a choice
 
 LETTERS = {
     **{f"\\{name}": letter for name, letter in greek_unicode.items()},

@@ -14,11 +14,10 @@ from typing import TypeAlias
 import sympy as sp
 from sympy.printing.pretty.pretty_symbology import greek_unicode
 
+# Greek letters written in their variant form: (LaTeX, Unicode).
 VARIANTS = {"theta": ("\\vartheta", "ϑ"), "epsilon": ("\\varepsilon", "ε")}
-"""Greek letters written in their variant form: (LaTeX, Unicode)."""
-
+# Name of a function in SymPy -> name in LaTeX, if they differ.
 NAMES = {"atan": "arctan", "asin": "arcsin", "acos": "arccos", "sign": "sgn"}
-"""Name of a function in SymPy -> name in LaTeX, if they differ."""
 
 LATEX_FUNCTIONS = {
     "arccos",
@@ -136,8 +135,7 @@ class Text:
         return str(sp.sstr(e))
 
 
-Style: TypeAlias = Latex | Text
-"""A style: methods that join the parts of a formula to text."""
+Style: TypeAlias = Latex | Text  # a style: methods that join the parts of a formula to text
 
 
 @dataclass(frozen=True, slots=True)

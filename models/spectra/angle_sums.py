@@ -6,8 +6,7 @@ from ..algebra.cosine_sums import AngleSum, read
 from .matrix import Matrix
 from .solve import spectrum
 
-SMALL = 100
-"""Most rows of a matrix without a closed form whose eigenvalues `angle_sums` computes."""
+SMALL = 100  # most rows of a matrix without a closed form whose eigenvalues `angle_sums` computes
 
 
 def angle_sums(matrix: Matrix) -> list[tuple[AngleSum, int]] | None:

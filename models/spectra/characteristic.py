@@ -23,11 +23,8 @@ T = TypeVar("T")
 
 Entries: TypeAlias = Mapping[tuple[int, int], int]
 
-Polynomial: TypeAlias = Any
-"""A flint polynomial (flint has no types)."""
-
-Transfer: TypeAlias = tuple[Polynomial, Polynomial, Polynomial, Polynomial]
-"""A 2 x 2 matrix of polynomials, row by row."""
+Polynomial: TypeAlias = Any  # a flint polynomial (flint has no types)
+Transfer: TypeAlias = tuple[Polynomial, Polynomial, Polynomial, Polynomial]  # a 2 x 2 matrix of polynomials, row by row
 
 Branch: TypeAlias = tuple[Polynomial, Polynomial]
 """(Π P_k, Σ_k b_k Q_k Π_(j != k) P_j) over some branches k of a node; see `forest`."""

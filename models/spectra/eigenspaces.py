@@ -30,11 +30,10 @@ from .jordan import value_at
 from .matrix import Matrix
 from .solve import spectrum
 
+# Most nodes of a graph whose eigenvectors are computed, which takes a few seconds if no eigenvalue is rational.
 LARGEST = 100
-"""Most nodes of a graph whose eigenvectors are computed, which takes a few seconds if no eigenvalue is rational."""
-
+# A number of Q(γ): integer coefficients of 1, γ, γ² … γ^(d-1), where d is the degree of γ.
 Entry: TypeAlias = tuple[int, ...]
-"""A number of Q(γ): integer coefficients of 1, γ, γ² … γ^(d-1), where d is the degree of γ."""
 
 Vector: TypeAlias = tuple[Entry, ...]
 
@@ -99,7 +98,20 @@ def eigenspaces(matrix: Matrix) -> tuple[Eigenspace, ...]:
         polynomial = minimal_polynomial(eigenvalue.number)
         key = tuple(polynomial.coeffs())
         if key not in bases:
-            bases[key] = _basis(matrix, polynomial)
+            # Eigenvectors are polynomials in γ, valid for every root γ of a monic irreducible polynomial.
+            rational, kernel = _rational(matrix), null_space(value_at(matrix, polynomial))
+            degree, independent, basis = int(polynomial.degree()), list[list[fmpq]](), list[Vector]()
+            for start in kernel:
+                if degree > 1 and fmpq_mat([*independent, start]).rank() == len(independent):
+                    continue
+                # b_(d-1) = v, b_(k-1) = G b_k + p_k v: see the head of this module
+                parts = [fmpq_mat(matrix.n, 1, start)]
+                for k in range(degree - 1, 0, -1):
+                    parts.append(rational * parts[-1] + parts[0] * polynomial[k])
+                columns = [[part[i, 0] for i in range(matrix.n)] for part in reversed(parts)]
+                independent += columns
+                basis.append(_whole(columns))
+            bases[key] = tuple(basis)
             check(matrix, polynomial, bases[key])
             if eigenvalue.geometric not in (None, len(bases[key])):
                 raise ProofError(
@@ -108,23 +120,6 @@ def eigenspaces(matrix: Matrix) -> tuple[Eigenspace, ...]:
                 )
         spaces.append(Eigenspace(eigenvalue, bases[key]))
     return tuple(spaces)
-
-
-def _basis(matrix: Matrix, polynomial: fmpq_poly) -> tuple[Vector, ...]:
-    """Compute eigenvectors as polynomials in γ, valid for every root γ of a monic irreducible polynomial."""
-    rational, kernel = _rational(matrix), null_space(value_at(matrix, polynomial))
-    degree, independent, basis = int(polynomial.degree()), list[list[fmpq]](), list[Vector]()
-    for start in kernel:
-        if degree > 1 and fmpq_mat([*independent, start]).rank() == len(independent):
-            continue
-        # b_(d-1) = v, b_(k-1) = G b_k + p_k v: see the head of this module
-        parts = [fmpq_mat(matrix.n, 1, start)]
-        for k in range(degree - 1, 0, -1):
-            parts.append(rational * parts[-1] + parts[0] * polynomial[k])
-        columns = [[part[i, 0] for i in range(matrix.n)] for part in reversed(parts)]
-        independent += columns
-        basis.append(_whole(columns))
-    return tuple(basis)
 
 
 def _rational(matrix: Matrix) -> fmpq_mat:

@@ -19,13 +19,11 @@ from ..algebra.equality import equal, sign
 from ..algebra.rationals import to_fraction
 from ..algebra.roots import ComplexRoot, RealRoot, Root
 
-NEAR = 1e-12
-"""Numbers are compared exactly if their floats differ by less than this relative difference."""
+NEAR = 1e-12  # numbers are compared exactly if their floats differ by less than this relative difference
 
 Number: TypeAlias = sp.Expr | Root
 
-Blocks: TypeAlias = tuple[tuple[int, int], ...]
-"""(size, number of Jordan blocks of that size), the largest size first."""
+Blocks: TypeAlias = tuple[tuple[int, int], ...]  # (size, number of Jordan blocks of that size), the largest size first
 
 
 class ProofError(RuntimeError):

@@ -24,14 +24,11 @@ from .jordan import value_at
 from .matrix import Matrix
 from .solve import DENSE_LIMIT, spectrum
 
-BITS = (64, 256, 1024)
-"""Precisions in bits at which sums of eigenvalues are separated, tried in this order."""
-
+BITS = (64, 256, 1024)  # precisions in bits at which sums of eigenvalues are separated, tried in this order
+# Try factors t = k/PRIME of a further matrix, k = 1 … TRIED; only few of these make two sums equal.
 PRIME, TRIED = 97, 100
-"""Try factors t = k/PRIME of a further matrix, k = 1 … TRIED; only few of these make two sums equal."""
-
+# For each common mode: the eigenvalue of each graph, and the eigenvalue of the combined matrix.
 Modes: TypeAlias = "tuple[tuple[tuple[Eigenvalue, ...], Eigenvalue], ...]"
-"""For each common mode: the eigenvalue of each graph, and the eigenvalue of the combined matrix."""
 
 
 @dataclass(frozen=True, slots=True)

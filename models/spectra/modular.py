@@ -25,17 +25,11 @@ from .characteristic import pairwise_product, sparse
 from .eigenvalue import ProofError
 from .matrix import Matrix
 
-PRIMES = 3
-"""Number of primes with which `check_modulo` compares."""
-
-BITS = 61
-"""The primes lie between 2**BITS and 2**(BITS + 1), so that residues fit into 64 bits."""
-
-LONGEST = 10_000
-"""Most roots of unity into which `_surd` expands a square root."""
-
+PRIMES = 3  # number of primes with which `check_modulo` compares
+BITS = 61  # the primes lie between 2**BITS and 2**(BITS + 1), so that residues fit into 64 bits
+LONGEST = 10_000  # most roots of unity into which `_surd` expands a square root
+# The number shift + Σ b exp(2πit), stored as (shift, ((t, b), …)).
 Powers = tuple[Fraction, tuple[tuple[Fraction, Fraction], ...]]
-"""The number shift + Σ b exp(2πit), stored as (shift, ((t, b), …))."""
 
 
 def check_modulo(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]]) -> float | None:

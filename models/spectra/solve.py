@@ -31,17 +31,14 @@ from .matrix import Matrix
 from .modular import check_modulo
 from .spectrum import Spectrum
 
-DENSE_LIMIT = 1000
-"""Most rows of a matrix without a closed form; exact factorisation of larger matrices takes too long."""
+DENSE_LIMIT = 1000  # most rows of a matrix without a closed form; exact factorisation of larger matrices takes too long
 
 
 class Proof(StrEnum):
     """Method by which a closed form is compared with the characteristic polynomial of its graph."""
 
-    EXACT = "exact"
-    """Multiply the closed form out over the rationals."""
-    MODULAR = "modular"
-    """Multiply the closed form out modulo three large primes (seconds for 1000 nodes)."""
+    EXACT = "exact"  # Multiply the closed form out over the rationals
+    MODULAR = "modular"  # Multiply the closed form out modulo three large primes (seconds for 1000 nodes)
     NONE = "none"
 
     @classmethod
@@ -56,11 +53,29 @@ def spectrum(graph: Matrix, proof: Proof | None = None) -> Spectrum:
     try:
         pairs = graph.closed_form()
         if pairs is None:
-            return _by_factors(graph)
+            # The irreducible factors of the characteristic polynomial give the spectrum and its proof.
+            if graph.n > DENSE_LIMIT:
+                raise ValueError(
+                    f"topology {graph.name}: n = {graph.n} without a closed form; expected at most {DENSE_LIMIT} "
+                    "nodes: exact factors of larger matrices take too long"
+                )
+            polynomial = characteristic(graph)
+            claims = []
+            for factor, count in polynomial.factor()[1]:
+                coefficients = tuple(int(c) for c in factor.numer().coeffs())
+                jordan = blocks(graph, factor, count)
+                claims += [Eigenvalue(number, count, jordan) for number in written(factor) or roots(coefficients)]
+            return _proved(graph, claims, polynomial)
         proof = proof or Proof.of_size(graph.n)
         if proof is Proof.EXACT:
             return _proved(graph, [_with_blocks(graph, pair) for pair in pairs], characteristic(graph))
-        return _unverified(graph, pairs, check_modulo(graph, pairs) if proof is Proof.MODULAR else None)
+        error_probability = check_modulo(graph, pairs) if proof is Proof.MODULAR else None
+        if isinstance(pairs, LazyEigenvalues):
+            lazy = LazyEigenvalues(len(pairs), pairs.n, lambda k: _candidate(pairs[k], True))
+            return Spectrum(lazy, error_probability=error_probability)
+        simple = graph.diagonalisable
+        candidates = [_candidate(pair, simple) for pair in pairs]
+        return Spectrum(ordered(candidates), error_probability=error_probability)
     except ProofError as error:
         if isinstance(graph.name, OwnFile):
             raise ValueError(f"{graph.name.path}: {error}") from None
@@ -70,32 +85,6 @@ def spectrum(graph: Matrix, proof: Proof | None = None) -> Spectrum:
 def has_closed_form(graph: Matrix) -> bool:
     """Return whether a graph has a closed form of its eigenvalues."""
     return graph.closed_form() is not None
-
-
-def _by_factors(graph: Matrix) -> Spectrum:
-    """Compute the spectrum from the irreducible factors of the characteristic polynomial."""
-    if graph.n > DENSE_LIMIT:
-        raise ValueError(
-            f"topology {graph.name}: n = {graph.n} without a closed form; expected at most {DENSE_LIMIT} "
-            "nodes: exact factors of larger matrices take too long"
-        )
-    polynomial = characteristic(graph)
-    claims = []
-    for factor, count in polynomial.factor()[1]:
-        coefficients = tuple(int(c) for c in factor.numer().coeffs())
-        jordan = blocks(graph, factor, count)
-        claims += [Eigenvalue(number, count, jordan) for number in written(factor) or roots(coefficients)]
-    return _proved(graph, claims, polynomial)
-
-
-def _unverified(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]], error_probability: float | None) -> Spectrum:
-    """Make a spectrum of a closed form without the exact proof."""
-    if isinstance(pairs, LazyEigenvalues):
-        lazy = LazyEigenvalues(len(pairs), pairs.n, lambda k: _candidate(pairs[k], True))
-        return Spectrum(lazy, error_probability=error_probability)
-    simple = graph.diagonalisable
-    candidates = [_candidate(pair, simple) for pair in pairs]
-    return Spectrum(ordered(candidates), error_probability=error_probability)
 
 
 def _candidate(pair: tuple[sp.Expr, int], simple: bool) -> Eigenvalue:

@@ -16,8 +16,7 @@ from ..inputs.checks import check_instance
 from ..inputs.display import HasLatex, HasPlot
 from .eigenvalue import Eigenvalue, decimal
 
-SHOWN = 24
-"""Most eigenvalues in the text of a spectrum; of more, the text leaves out the middle."""
+SHOWN = 24  # most eigenvalues in the text of a spectrum; of more, the text leaves out the middle
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,8 +13,7 @@ from sympy.polys.matrices import DomainMatrix
 
 from .eigenvalue import ProofError
 
-Z = sp.Symbol("z")
-"""The variable of characteristic polynomials; no weight may have this name."""
+Z = sp.Symbol("z")  # the variable of characteristic polynomials; no weight may have this name
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,7 @@ from itertools import islice
 
 from ..inputs.checks import check_integer, check_keys, check_number, check_text, short_repr
 
-LIMIT = 10_000_000
-"""Most values on one axis: a choice that bounds the memory of a scene."""
+LIMIT = 10_000_000  # most values on one axis: a choice that bounds the memory of a scene
 
 
 @dataclass(frozen=True, slots=True)

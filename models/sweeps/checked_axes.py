@@ -27,11 +27,8 @@ class Continuation(Word):
     DOWN = "down"
 
 
-CELL_LIMIT = 10**9
-"""Most cells of a sweep, a choice; large results go to a file, block by block (`synchain.stream`)."""
-
-SAMPLE_LIMIT = 10**9
-"""Most numbers in the trajectories of all cells, 8 GB."""
+CELL_LIMIT = 10**9  # most cells of a sweep, a choice; large results go to a file, block by block (`synchain.stream`)
+SAMPLE_LIMIT = 10**9  # most numbers in the trajectories of all cells, 8 GB
 
 
 def check_sweep(model: Model, values: Mapping[str, Any]) -> Continuation:

@@ -14,8 +14,8 @@ from ..inputs.checks import check_number, check_positive, check_text, short_repr
 from ..inputs.reader import Algebra, NoMeaning, parse, unpaired
 from ..inputs.words import Word
 
+# List of all distributions for messages.
 KNOWN = "normal(mean, deviation), uniform(low, high), lorentzian(centre, half width)"
-"""List of all distributions for messages."""
 
 
 class Distribution(Word):

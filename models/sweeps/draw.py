@@ -59,11 +59,9 @@ class RandomGraph:
         return self.text
 
 
+# A distribution, a listed row for each realisation (one number, or one a node or link), graphs, or a random graph.
 Draws = Draw | tuple[tuple[float, ...], ...] | Graphs | RandomGraph
-"""A distribution, a listed row for each realisation (one number, or one a node or link), graphs, or a random graph."""
-
-GRAPH = "topology"
-"""The key of the graph in the draws."""
+GRAPH = "topology"  # the key of the graph in the draws
 
 
 def draws(value: object, realisations: object) -> FrozenDict[Draws]:

@@ -9,8 +9,7 @@ from typing import Any
 from ..inputs.checks import check_integer, check_keys, check_number, check_table, first_of, is_row, short_repr
 from ..inputs.frozen import FrozenDict
 
-SEED_LIMIT = 2**63 - 1
-"""Largest seed: the largest signed integer of 64 bits, which netCDF and JSON readers keep."""
+SEED_LIMIT = 2**63 - 1  # largest seed: the largest signed integer of 64 bits, which netCDF and JSON readers keep
 
 
 def default_start(

@@ -18,8 +18,7 @@ from .axis import Axis
 
 T = TypeVar("T")
 
-Place: TypeAlias = NodeName | LinkName
-"""The name of a parameter at one node or one link."""
+Place: TypeAlias = NodeName | LinkName  # the name of a parameter at one node or one link
 
 
 def parameters(model: Model, table: object, axes: Sequence[Axis]) -> FrozenDict[float]:

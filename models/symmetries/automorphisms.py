@@ -8,11 +8,8 @@ from collections.abc import Hashable, Iterator, Sequence
 from ..graphs.topology import Topology
 from .partitions import balanced_in_all
 
-Permutation = tuple[int, ...]
-"""The image of each node."""
-
-STEP_LIMIT = 2_000_000
-"""Most images that a search tries (a few seconds), a choice."""
+Permutation = tuple[int, ...]  # the image of each node
+STEP_LIMIT = 2_000_000  # most images that a search tries (a few seconds), a choice
 
 
 def automorphisms(

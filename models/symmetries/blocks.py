@@ -30,14 +30,12 @@ from ..algebra.rationals import to_flint, to_fraction
 from ..algebra.roots import RealRoot, roots
 from ..spectra.eigenvalue import ProofError
 
+# Number of generic elements that are tried if one of them splits the space, and at most (a choice).
 ENOUGH, ELEMENTS = 2, 6
-"""Number of generic elements that are tried if one of them splits the space, and at most (a choice)."""
-
+# Primes below 2**31 for ranks modulo a prime.
 PRIMES = (2147483647, 2147483629, 2147483587, 2147483579, 2147483563, 2147483549, 2147483543, 2147483497)
-"""Primes below 2**31 for ranks modulo a prime."""
-
+# A number of a field Q(θ) as a polynomial in θ, reduced by the minimal polynomial of θ (flint has no types).
 Polynomial: TypeAlias = Any
-"""A number of a field Q(θ) as a polynomial in θ, reduced by the minimal polynomial of θ (flint has no types)."""
 
 Vector: TypeAlias = list[Polynomial]
 
@@ -68,8 +66,7 @@ class FieldNumber:
         return f"{self.value:.16g}"
 
 
-Exact: TypeAlias = Fraction | FieldNumber
-"""An exact real number; `float(number)` is the nearest float."""
+Exact: TypeAlias = Fraction | FieldNumber  # an exact real number; `float(number)` is the nearest float
 
 
 def plus(number: Exact, more: Fraction) -> Exact:

@@ -29,14 +29,9 @@ from .automorphisms import automorphisms
 from .blocks import Generator, Rows, irreducible_subspaces
 from .partitions import class_links
 
-NODE_LIMIT = 64
-"""Most nodes of a graph whose symmetries are searched, a choice."""
-
-PARTITION_LIMIT = 5000
-"""Most partitions in a list, a choice."""
-
-Graphs = Topology | Sequence[Topology]
-"""A graph, or the graphs of several layers of links on the same nodes."""
+NODE_LIMIT = 64  # most nodes of a graph whose symmetries are searched, a choice
+PARTITION_LIMIT = 5000  # most partitions in a list, a choice
+Graphs = Topology | Sequence[Topology]  # a graph, or the graphs of several layers of links on the same nodes
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,8 +29,7 @@ from ..spectra.eigenspaces import null_space
 from ..spectra.eigenvalue import Eigenvalue
 from ..spectra.jordan import value_at
 
-LARGEST = 300
-"""Most nodes of a graph whose eigenvectors are compared, a choice."""
+LARGEST = 300  # most nodes of a graph whose eigenvectors are compared, a choice
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,7 @@ from itertools import combinations
 from ..graphs.families import Family
 from ..inputs.options import integer_option
 
-_ATTEMPTS = 1000
-"""Most attempts at a pairing; at the highest degree that is drawn, n/2, one attempt in five succeeds."""
+_ATTEMPTS = 1000  # most attempts at a pairing; at the highest degree that is drawn, n/2, one attempt in five succeeds
 
 _Edges = set[tuple[int, int]]
 

@@ -9,8 +9,7 @@ from fractions import Fraction
 from ..graphs.families import Family
 from ..inputs.options import integer_option, probability_option
 
-_DRAWS = 10**7
-"""Most random numbers drawn for a graph; a node joined to nearly all others rejects most draws."""
+_DRAWS = 10**7  # most random numbers drawn for a graph; a node joined to nearly all others rejects most draws
 
 
 def settle(n: int, neighbours: object, p: object, seed: object) -> dict[str, object]:
@@ -41,18 +40,15 @@ def edges(n: int, *, neighbours: int = 4, p: str = "1/10", seed: int = 0) -> Ite
     for s in laps:
         for i in range(n):
             if stream.random() < chance and len(near[i]) < n - 1:
-                _rewire(near, i, (i + s) % n, stream)
+                old = (i + s) % n
+                new = i
+                while new == i or new in near[i]:
+                    new = int(stream.random() * len(near))
+                near[i].remove(old)
+                near[old].remove(i)
+                near[i].add(new)
+                near[new].add(i)
     return ((i, j, 1) for i in range(n) for j in sorted(near[i]) if i < j)
-
-
-def _rewire(near: list[set[int]], i: int, old: int, stream: random.Random) -> None:
-    new = i
-    while new == i or new in near[i]:
-        new = int(stream.random() * len(near))
-    near[i].remove(old)
-    near[old].remove(i)
-    near[i].add(new)
-    near[new].add(i)
 
 
 TOPOLOGY = Family(

@@ -10,11 +10,8 @@ from synchain.codegen.driver.columns import COUNTS, TOLERANCES, Count, PointColu
 
 from ..support.status import Status
 
-FINISHED = int(Status.FINISHED)
-"""`Status.FINISHED` as a number: NumPy compares with it three times as fast."""
-
-IN_MEMORY = 10**9
-"""Size of the largest result in memory, in numbers (8 GB): a choice."""
+FINISHED = int(Status.FINISHED)  # `Status.FINISHED` as a number: NumPy compares with it three times as fast
+IN_MEMORY = 10**9  # size of the largest result in memory, in numbers (8 GB): a choice
 
 
 def numbers_of_a_cell(dimension: int, room: int, samples: int, observed: int = 0, point_size: int | None = None) -> int:

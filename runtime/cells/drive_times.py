@@ -13,20 +13,11 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import Drive, as_function, drive_of, names_in
 from synchain.models.mechanics.components import TIME
 
-POINTS = 1 << 14
-"""Number of samples of a drive in one period: a choice for speed."""
-
-PERIODS = 16
-"""A drive without a period has PERIODS times as many samples: a choice for speed."""
-
-RESOLVED = 2.0
-"""Two zeros closer than this number of samples count as distinct only if a parabola separates them."""
-
-WIDTH = 2.0
-"""Change of the argument of tanh over which it rises by three quarters of its height."""
-
-TOUCH = 1e-9
-"""Ignore intervals shorter than TOUCH periods: the drive only touches zero there, to rounding."""
+POINTS = 1 << 14  # number of samples of a drive in one period: a choice for speed
+PERIODS = 16  # a drive without a period has PERIODS times as many samples: a choice for speed
+RESOLVED = 2.0  # two zeros closer than this number of samples count as distinct only if a parabola separates them
+WIDTH = 2.0  # change of the argument of tanh over which it rises by three quarters of its height
+TOUCH = 1e-9  # ignore intervals shorter than TOUCH periods: the drive only touches zero there, to rounding
 
 
 def periods(equations: Equations, parameters: np.ndarray) -> np.ndarray:

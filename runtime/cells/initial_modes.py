@@ -13,8 +13,7 @@ from synchain.models.mechanics.components import TIME
 
 from .row_modes import row_modes
 
-CLOCK = 8.0
-"""Period of the clock of an oscillator without a drive: a power of two, so that no digit is lost."""
+CLOCK = 8.0  # period of the clock of an oscillator without a drive: a power of two, so that no digit is lost
 
 
 def with_modes(equations: Equations, start: np.ndarray, parameters: np.ndarray) -> np.ndarray:

@@ -9,14 +9,10 @@ import numpy as np
 
 from synchain.models.scenes.scene import Scene
 
-REFILLS = 16
-"""Largest number of cells of a block per lane: a choice, so that few lanes are idle at the end of a block."""
-
-SHARE = 8
-"""A block is at most 1/SHARE of the work of one worker, so that all workers are busy to the end: a choice."""
-
+REFILLS = 16  # largest number of cells of a block per lane: a choice, so that few lanes are idle at the end of a block
+SHARE = 8  # a block is at most 1/SHARE of the work of one worker, so that all workers are busy to the end: a choice
+# Largest product of oscillators and periods of a block with more than one cell per lane: about a minute of work.
 LONGEST = 1e7
-"""Largest product of oscillators and periods of a block with more than one cell per lane: about a minute of work."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,22 +19,16 @@ from synchain.models.mechanics.components import TIME, Block, Edge, Node
 
 from .stiffness_rates import eigenvalue_rates, turns
 
+# Slopes are computed for at most this number of nodes, and of links of one layer: a choice for speed.
 NODES, LINKS = 50, 5000
-"""Slopes are computed for at most this number of nodes, and of links of one layer: a choice for speed."""
-
+# The change of rates is measured over this part of the shortest time of a motion: a choice far above rounding.
 SHIFT = 1e-6
-"""The change of rates is measured over this part of the shortest time of a motion: a choice far above rounding."""
-
+# Rates, and changes of rates, that NOISE tolerances of the state could cause count as errors of steps: a choice.
 NOISE = 10.0
-"""Rates, and changes of rates, that NOISE tolerances of the state could cause count as errors of steps: a choice."""
-
-BLOCK = 4096
-"""Number of cells that are computed at once: a choice that bounds the memory."""
-
+BLOCK = 4096  # number of cells that are computed at once: a choice that bounds the memory
+# STEP: length of steps along the imaginary axis. ENDLESS: a larger slope counts as infinite; such a step gives 1e100
+# for the infinite slope of sqrt(x) at 0.
 STEP, ENDLESS = 1e-200, 1e60
-"""STEP: length of steps along the imaginary axis. ENDLESS: a larger slope counts as infinite; such a step gives 1e100
-for the
-infinite slope of sqrt(x) at 0."""
 
 Column = int | np.ndarray
 

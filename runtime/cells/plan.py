@@ -14,12 +14,11 @@ from synchain.models.scenes.scene import Scene
 from .drive_times import longest_steps, periods
 from .initial_modes import local_clock, with_modes
 
+# Step tried first in every cell, in units of non-dimensional time: a choice; step control enlarges it sixfold at a
+# time.
 FIRST_STEP = 1e-4
-"""Step tried first in every cell, in units of non-dimensional time: a choice; step control enlarges it sixfold at a
-time."""
-
+# The kernel that is compiled first is chosen by the rates of this number of nodes, in all cells together: a choice.
 LOOKED_AT = 200
-"""The kernel that is compiled first is chosen by the rates of this number of nodes, in all cells together: a choice."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,15 +15,13 @@ from synchain.models.inputs.unsupported import unsupported
 from synchain.models.scenes.scene import KEYWORDS, Scene, check_scene
 from synchain.models.sweeps.parameters import without
 
+# Keywords that a function of several orbits does not accept, with the reason for the error message.
 ORBITS = {"executor": "its orbits advance on threads of this process, as many as `workers` says"}
-"""Keywords that a function of several orbits does not accept, with the reason for the error message."""
-
+# Keywords that a function of a single orbit does not accept, with the reason for the error message.
 ONE_ORBIT = {name: "it advances one orbit, step after step, on one thread" for name in ("workers", "executor")}
-"""Keywords that a function of a single orbit does not accept, with the reason for the error message."""
+SHOWN = 12  # largest number of initial states in an error message: a choice
 
-SHOWN = 12
-"""Largest number of initial states in an error message: a choice."""
-
+# Settings of a scene without sweep and records, for functions that choose their own cells and records.
 ONE_CELL: Mapping[str, Any] = {
     "axes": (),
     "zipped": False,
@@ -34,7 +32,6 @@ ONE_CELL: Mapping[str, Any] = {
     "sections": None,
     "stop": None,
 }
-"""Settings of a scene without sweep and records, for functions that choose their own cells and records."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +131,9 @@ class Given:
 
     def _refusal(self, scene: Scene, name: str, states: bool) -> str:
         """Return the error message for a name that is not accepted."""
-        of, keywords = self.function.__name__, _keywords_of(self.function)
+        arguments = inspect.signature(self.function).parameters.values()
+        keywords = [a.name for a in arguments if a.kind is not a.VAR_KEYWORD and a.name != "scene"]
+        of = self.function.__name__
         if name in keywords:
             return f"{of}: found its keyword {name!r} in `parameters`; expected parameters of the scene"
         if name in self.refused:
@@ -176,9 +175,3 @@ def _state(scene: Scene, name: str) -> NodeName | None:
     """Return the parts of the name of an initial state, or None; derive equations only for names of that form."""
     state = NodeName.parse(name)
     return state if state and state.base in scene.components and name in scene.equations.state else None
-
-
-def _keywords_of(function: Callable[..., object]) -> list[str]:
-    """Return the names of a function's keywords, without the scene and the collection of parameters."""
-    arguments = inspect.signature(function).parameters.values()
-    return [a.name for a in arguments if a.kind is not a.VAR_KEYWORD and a.name != "scene"]

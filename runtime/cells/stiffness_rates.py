@@ -13,14 +13,10 @@ import sympy as sp
 from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import TIME
 
-NODES = 50
-"""Rates are computed for at most this number of orbits: a choice for speed."""
-
-SPREAD = 30.0
-"""A decay counts as separate if it is SPREAD times as fast as the slowest motion of its node: a choice."""
-
+NODES = 50  # rates are computed for at most this number of orbits: a choice for speed
+SPREAD = 30.0  # a decay counts as separate if it is SPREAD times as fast as the slowest motion of its node: a choice
+# Functions that are steep, or turn sharply, where their argument is zero: the layer of a smoothed jump.
 TURNING = (sp.atan, sp.tanh, sp.erf, sp.Abs)
-"""Functions that are steep, or turn sharply, where their argument is zero: the layer of a smoothed jump."""
 
 
 class FastestRates(NamedTuple):

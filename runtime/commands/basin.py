@@ -15,10 +15,10 @@ EXAMPLES = (
     "synchain basin two_oscillators --set sigma=0.05:0.3:6 --samples 100 -o basin.nc",
 )
 
+# Keywords of `synchain.basin` that are options.
 OPTIONS = (
     "samples", "ranges", "attractors", "nodes", "bound", "tolerance", "transient", "window", "rng", "workers"
 )  # fmt: skip
-"""Keywords of `synchain.basin` that are options."""
 
 
 def configure(parser: ArgumentParser) -> None:

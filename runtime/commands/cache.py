@@ -27,7 +27,16 @@ def execute(arguments: Namespace) -> int:
     if arguments.json and arguments.action != "info":
         raise WrongUse(f"found --json with {arguments.action}; expected it with info; leave it out")
     if arguments.action == "warm":
-        return _warm()
+        # Compile the common drivers that the folder lacks, with a line for each.
+        from synchain.codegen.kernels import driver
+        from synchain.codegen.machine_code.compile import load_shared
+
+        for common in driver.common_drivers():
+            shared = load_shared(common)
+            if shared.problem:
+                raise Failed(f"drivers are not kept on disk: {shared.problem}")
+            print(f"{'was there' if shared.from_cache else 'compiled':9}  {common}", flush=True)
+        return FINE
     from synchain.codegen.machine_code.cache import clear, describe
 
     try:
@@ -45,19 +54,6 @@ def execute(arguments: Namespace) -> int:
         raise Failed(f"the kernel cache cannot be read or emptied: {sentence(problem)}") from problem
     except RuntimeError as problem:  # no home folder
         raise Failed(f"no kernel cache: {sentence(problem)} Set SYNCHAIN_CACHE to a folder of yours") from problem
-    return FINE
-
-
-def _warm() -> int:
-    """Compile the common drivers that the folder lacks, with a line for each."""
-    from synchain.codegen.kernels import driver
-    from synchain.codegen.machine_code.compile import load_shared
-
-    for common in driver.common_drivers():
-        shared = load_shared(common)
-        if shared.problem:
-            raise Failed(f"drivers are not kept on disk: {shared.problem}")
-        print(f"{'was there' if shared.from_cache else 'compiled':9}  {common}", flush=True)
     return FINE
 
 

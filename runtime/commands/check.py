@@ -21,11 +21,8 @@ EXAMPLES = (
     "synchain check claims.txt --junit report.xml",
 )
 
-Undecided: TypeAlias = tuple[int, str, str]
-"""Line, text and reason of a claim that cannot be decided."""
-
-SHOWN = 3
-"""Wrong sizes that are described of a line about a range of n."""
+Undecided: TypeAlias = tuple[int, str, str]  # line, text and reason of a claim that cannot be decided
+SHOWN = 3  # wrong sizes that are described of a line about a range of n
 
 
 def configure(parser: ArgumentParser) -> None:

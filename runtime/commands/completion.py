@@ -18,8 +18,8 @@ SHELLS = ("bash", "zsh", "fish")
 
 ByShell: TypeAlias = dict[str, str]
 
+# What completes SCENE: a function of PREAMBLE, which offers the shipped scenes and files.
 SCENES: ByShell = {"bash": "_synchain_scene_files", "zsh": "_synchain_scene_files", "fish": "(_synchain_scene_files)"}
-"""What completes SCENE: a function of PREAMBLE, which offers the shipped scenes and files."""
 
 PREAMBLE: ByShell = {
     "bash": """\

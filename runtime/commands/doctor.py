@@ -20,9 +20,9 @@ EXAMPLES = ("synchain doctor", "synchain doctor --json")
 
 SOUND, DOUBTFUL, WRONG = "fine", "doubtful", "wrong"
 
-TRAJECTORY_ERROR = 1e-9
-"""Largest error of a state of the trial kernel."""
+TRAJECTORY_ERROR = 1e-9  # largest error of a state of the trial kernel
 
+# Position and velocity of TRIAL at the ends of five drive periods, from quadruple precision.
 DRIVE_PERIODS = (
     (0.49651127615228413, -0.0057670521276488),
     (0.18501018103435476, 0.09999773701994646),
@@ -30,16 +30,14 @@ DRIVE_PERIODS = (
     (0.004262807240396986, 0.10000256031741263),
     (0.5505620170579013, 0.09997575781703481),
 )
-"""Position and velocity of TRIAL at the ends of five drive periods, from quadruple precision."""
 
+# Parameters of the friction oscillator that is integrated, from rest at x = 0.3.
 TRIAL = {"omega": 1.15, "u": 0.1, "theta_b": 0.1, "epsilon": 2.0, "mu_s": 0.3, "mu_k": 0.15, "a": 2.5, "kappa": 1e5}
-"""Parameters of the friction oscillator that is integrated, from rest at x = 0.3."""
 
 
 NO_FMA = "kernels take up to twice the time and round otherwise; unset NUMBA_CPU_NAME and NUMBA_CPU_FEATURES if set"
 
-Answer = tuple[str, str, str]
-"""Outcome, what was found, what helps."""
+Answer = tuple[str, str, str]  # outcome, what was found, what helps
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -197,6 +195,7 @@ def judge_trajectory(error: float, steps: int) -> Answer:
     return SOUND, text, ""
 
 
+# Checks by name.
 CHECKS: Mapping[str, Callable[[], Answer]] = {
     "packages": _packages,
     "cache": _cache,
@@ -204,4 +203,3 @@ CHECKS: Mapping[str, Callable[[], Answer]] = {
     "spectrum": _spectrum,
     "trajectory": _trajectory,
 }
-"""Checks by name."""

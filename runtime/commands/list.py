@@ -10,8 +10,7 @@ from ..console.outcome import FINE, print_json
 SUMMARY = "list oscillators, couplings, friction laws, graphs or scenes by name"
 EXAMPLES = ("synchain list oscillators", "synchain list graphs", "synchain list scenes --json")
 
-Row: TypeAlias = "dict[str, Any]"
-"""Name and summary of a part, and what else JSON has of it."""
+Row: TypeAlias = "dict[str, Any]"  # name and summary of a part, and what else JSON has of it
 
 
 def configure(parser: ArgumentParser) -> None:

@@ -14,8 +14,7 @@ EXAMPLES = (
     "synchain lyapunov duffing_chain --set u=0.5 --count 2 --json",
 )
 
-OPTIONS = ("count", "precision", "periods", "transient")
-"""Keywords of `synchain.lyapunov_spectrum` that are options."""
+OPTIONS = ("count", "precision", "periods", "transient")  # keywords of `synchain.lyapunov_spectrum` that are options
 
 
 def configure(parser: ArgumentParser) -> None:

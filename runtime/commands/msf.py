@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 
     from ..stability.msf import MSF, Plane
 
-Rows: TypeAlias = "dict[str, tuple[float, ...]]"
-"""The values of parameters that are axes."""
+Rows: TypeAlias = "dict[str, tuple[float, ...]]"  # the values of parameters that are axes
 
 SUMMARY = "compute the exponents of a network's modes from tangent equations, and where the network synchronises"
 EXAMPLES = (
@@ -42,8 +41,7 @@ EXAMPLES = (
     "synchain msf figure_8 --set sigma=0:0.4:81 omega=1.1:1.9:41 --out results",
 )
 
-POINTS = 1_000_000
-"""Most points of one plane."""
+POINTS = 1_000_000  # most points of one plane
 
 
 def configure(parser: ArgumentParser) -> None:

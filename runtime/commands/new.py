@@ -14,8 +14,7 @@ SUMMARY = "write a commented file to start a friction law, oscillator, coupling 
 EXAMPLES = ("synchain new friction my_law", "synchain new topology caterpillar --dir models/topologies")
 
 HOMES = {"topology": "topologies", "friction": "frictions", "oscillator": "oscillators", "coupling": "couplings"}
-LENGTH = 40
-"""Most characters of a name, a choice."""
+LENGTH = 40  # most characters of a name, a choice
 
 
 def configure(parser: ArgumentParser) -> None:

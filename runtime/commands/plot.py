@@ -14,8 +14,7 @@ EXAMPLES = (
     "synchain plot branch.nc -o branch.svg",
 )
 
-DOTS = 200
-"""Dots per inch of a bitmap, as in figures of the paper (a choice)."""
+DOTS = 200  # dots per inch of a bitmap, as in figures of the paper (a choice)
 
 
 def configure(parser: ArgumentParser) -> None:

@@ -36,11 +36,9 @@ EXAMPLES = (
     "synchain run figure_4a --explain",
 )
 
+# Endings of results (`synchain.runtime.results.store.FORMS`, which is not loaded for a help).
 FORMATS = ("nc", "nc4", "zarr")
-"""Endings of results (`synchain.runtime.results.store.FORMS`, which is not loaded for a help)."""
-
-PATIENCE = 10
-"""Seconds that a Dask scheduler has to answer."""
+PATIENCE = 10  # seconds that a Dask scheduler has to answer
 
 
 def configure(parser: ArgumentParser) -> None:

@@ -26,17 +26,11 @@ EXAMPLES = (
     "synchain spectrum --graphml network.graphml",
 )
 
-PROVED = 500
-"""Most nodes for which closed forms are multiplied out; this takes about two seconds."""
-
-SHOWN = 200
-"""Distinct eigenvalues in a table without --all."""
-
+PROVED = 500  # most nodes for which closed forms are multiplied out; this takes about two seconds
+SHOWN = 200  # distinct eigenvalues in a table without --all
+# The matrices of `--of`: attributes of a graph.
 OTHERS = ("adjacency", "laplacian", "signless_laplacian", "random_walk_laplacian")
-"""The matrices of `--of`: attributes of a graph."""
-
-CHECKED = 1000
-"""Most nodes for which they are multiplied out modulo primes; this takes some seconds."""
+CHECKED = 1000  # most nodes for which they are multiplied out modulo primes; this takes some seconds
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -93,7 +87,25 @@ def execute(arguments: Namespace) -> int:
     if arguments.symbolic:
         if arguments.of is not None:
             raise WrongUse("found --of with --symbolic; closed forms with symbols are those of G: give a size instead")
-        return _symbolic(arguments)
+        # Print the closed form of a family with symbols for its size, or the spectrum of a matrix of letters.
+        from synchain.models.graphs.closed_forms import closed_form
+        from synchain.models.graphs.graph_text import is_composed, read_form
+
+        if arguments.matrix is not None and arguments.topology is None:
+            return _letters(arguments)
+        files = [key for key in FILES if getattr(arguments, key) is not None]
+        if arguments.topology is None or arguments.n is not None or files:
+            raise WrongUse("--symbolic: expected a family without its size, e.g. synchain spectrum chain --symbolic")
+        name, options = arguments.topology, named_values(arguments.option)
+        if is_composed(name) and options:
+            raise WrongUse("--option: expected in the text of a product, e.g. 'cartesian(chain, torus(shape=(p, q)))'")
+        with wrong_use():
+            form = read_form(name) if is_composed(name) else closed_form(name, **options)
+        if arguments.json:
+            print_json({"topology": form.name, **form.as_dict()})
+        else:
+            print(form.text)
+        return FINE
     with wrong_use():
         graph = named_graph(arguments)
         matrix = graph if arguments.of is None else getattr(graph, arguments.of)
@@ -104,28 +116,6 @@ def execute(arguments: Namespace) -> int:
         print_json(eigenvalues.as_dict())
     else:
         print(table(eigenvalues, None if arguments.all else SHOWN))
-    return FINE
-
-
-def _symbolic(arguments: Namespace) -> int:
-    """Print the closed form of a family with symbols for its size, or the spectrum of a matrix of letters."""
-    from synchain.models.graphs.closed_forms import closed_form
-    from synchain.models.graphs.graph_text import is_composed, read_form
-
-    if arguments.matrix is not None and arguments.topology is None:
-        return _letters(arguments)
-    files = [key for key in FILES if getattr(arguments, key) is not None]
-    if arguments.topology is None or arguments.n is not None or files:
-        raise WrongUse("--symbolic: expected a family without its size, e.g. synchain spectrum chain --symbolic")
-    name, options = arguments.topology, named_values(arguments.option)
-    if is_composed(name) and options:
-        raise WrongUse("--option: expected in the text of a product, e.g. 'cartesian(chain, torus(shape=(p, q)))'")
-    with wrong_use():
-        form = read_form(name) if is_composed(name) else closed_form(name, **options)
-    if arguments.json:
-        print_json({"topology": form.name, **form.as_dict()})
-    else:
-        print(form.text)
     return FINE
 
 

@@ -25,8 +25,7 @@ EXAMPLES = (
     "synchain thresholds --matrix G.txt --omega 1.55 --quick",
 )
 
-COARSE = 2e-3
-"""Width in sigma to which a first look refines the ends of the ranges."""
+COARSE = 2e-3  # width in sigma to which a first look refines the ends of the ranges
 
 
 def configure(parser: ArgumentParser) -> None:

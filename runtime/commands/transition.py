@@ -14,8 +14,7 @@ EXAMPLES = (
     "synchain transition duffing_chain --alpha 0:2:401 --json",
 )
 
-OPTIONS = ("alpha", "precision", "periods", "starts", "workers")
-"""Keywords of `synchain.transition` that are options."""
+OPTIONS = ("alpha", "precision", "periods", "starts", "workers")  # keywords of `synchain.transition` that are options
 
 
 def configure(parser: ArgumentParser) -> None:

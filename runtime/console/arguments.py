@@ -9,12 +9,11 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 
 from .outcome import WrongUse
 
-NODES = 100_000
-"""Largest number of oscillators on the command line (a choice)."""
+NODES = 100_000  # largest number of oscillators on the command line (a choice)
 
 
+# Endings of files, which no folder has.
 FILES = (".csv", ".html", ".json", ".nc", ".nc4", ".pdf", ".png", ".svg", ".toml", ".txt", ".zarr")
-"""Endings of files, which no folder has."""
 
 
 def whole(text: str, least: int = -NODES, most: int = NODES) -> int:

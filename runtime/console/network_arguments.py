@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from synchain.models.graphs.topology import Topology
     from synchain.models.scenes.scene import Scene
 
-FILES = ("matrix", "edges", "graphml")
-"""Options that name a file with a graph."""
+FILES = ("matrix", "edges", "graphml")  # options that name a file with a graph
 
 
 def add_network(parser: ArgumentParser) -> None:

@@ -15,11 +15,9 @@ if TYPE_CHECKING:
 
     from ..results.labelled import Labelled
 
+# Numbers of a scene besides parameters and initial states that --set can change.
 SETTINGS = ("transient", "window", "samples", "rtol", "atol", "max_steps", "rng")
-"""Numbers of a scene besides parameters and initial states that --set can change."""
-
-COUNTS = ("samples", "max_steps", "rng")
-"""Those of them that are whole numbers."""
+COUNTS = ("samples", "max_steps", "rng")  # those of them that are whole numbers
 
 
 def add_changed_scene(parser: ArgumentParser, default: str = "", *, more: str = "") -> None:

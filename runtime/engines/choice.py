@@ -35,27 +35,18 @@ from ..cells.stiffness_rates import eigenvalue_rates, mode_rates
 from ..support.status import Status
 from .step_control import first_step, scale_of_atol, tolerances
 
+# Rosenbrock steps are faster if decay is STIFF times as fast as the turning and the change of a motion; measured in
+# docs/performance.md.
 STIFF = 30.0
-"""Rosenbrock steps are faster if decay is STIFF times as fast as the turning and the change of a motion; measured in
-docs/performance.md."""
-
+# Weight of the stiffness inside the layer of a smoothed jump: a choice; motion is in the layer for part of the time.
 LAYER = 0.1
-"""Weight of the stiffness inside the layer of a smoothed jump: a choice; motion is in the layer for part of the
-time."""
-
-FIRST_LOOK = 64.0
-"""Steps after which a cell first pauses if many more are to come: a choice."""
-
+FIRST_LOOK = 64.0  # steps after which a cell first pauses if many more are to come: a choice
+# Steps below this part of the shortest time of a motion are limited by the series, for example by a hidden pole: a
+# choice.
 STALLED = 0.01
-"""Steps below this part of the shortest time of a motion are limited by the series, for example by a hidden pole: a
-choice."""
-
+# A slide along a jump is ended after 1/SLIDE of max_steps if its remaining time needs SLIDE times max_steps: a choice.
 SLIDE = 64.0
-"""A slide along a jump is ended after 1/SLIDE of max_steps if its remaining time needs SLIDE times max_steps: a
-choice."""
-
-AUTOMATIC = ("taylor", "dop853", AUTO)
-"""The integrators of `auto`, in the order in which cells try them."""
+AUTOMATIC = ("taylor", "dop853", AUTO)  # the integrators of `auto`, in the order in which cells try them
 
 
 def method_names(scene: Scene) -> tuple[str, ...]:
@@ -127,7 +118,13 @@ class Ladder:
         endless = ~np.isfinite(paces.size)
         slow = np.maximum(np.maximum(paces.turning, paces.growth), math.pi / rows.spans[:, SpanColumn.LONGEST])
         stiff = (paces.parted > STIFF * slow) & (paces.parted * rows.spans[:, SpanColumn.END] > WORTH) & ~endless
-        stiff |= ~endless & ~stiff & self._enters_layers(rows, slow)
+        # Cells that start outside the layers of smoothed jumps may be stiff inside a layer.
+        enters = np.zeros(len(rows), dtype=bool)
+        for blocks in self.templates.layers(rows.start, rows.numbers):
+            fastest, turning, *_ = eigenvalue_rates(blocks)
+            within = LAYER * fastest * rows.spans[:, SpanColumn.END] > WORTH
+            enters |= within & (LAYER * fastest > STIFF * np.maximum(slow, LAYER * turning)) & np.isfinite(fastest)
+        stiff |= ~endless & ~stiff & enters
         last = len(self.methods) - 1 if self.solvable else self._explicit
         return np.where(stiff & (not self.equations.sticks), last, np.where(endless, self._explicit, 0))
 
@@ -228,15 +225,6 @@ class Ladder:
     def _explicit(self) -> int:
         """Index of the explicit method among the methods."""
         return next(k for k, m in enumerate(self.methods) if not m.series)
-
-    def _enters_layers(self, rows: CellRows, slow: np.ndarray) -> np.ndarray:
-        """Return whether cells (cells,) that start outside the layers of smoothed jumps are stiff inside a layer."""
-        enters = np.zeros(len(rows), dtype=bool)
-        for blocks in self.templates.layers(rows.start, rows.numbers):
-            fastest, turning, *_ = eigenvalue_rates(blocks)
-            within = LAYER * fastest * rows.spans[:, SpanColumn.END] > WORTH
-            enters |= within & (LAYER * fastest > STIFF * np.maximum(slow, LAYER * turning)) & np.isfinite(fastest)
-        return enters
 
 
 def at_start(templates: Templates, rows: CellRows) -> Paces:

@@ -34,8 +34,8 @@ from .engine import Engine
 from .ladder_engine import LadderEngine, run_rows
 from .scene_kernels import write_kernel
 
+# States (cells, dimension) that replace the start of the scene, and whether each is valid (cells,).
 Start = tuple[np.ndarray, np.ndarray]
-"""States (cells, dimension) that replace the start of the scene, and whether each is valid (cells,)."""
 
 
 class Job(Protocol):

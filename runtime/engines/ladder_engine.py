@@ -24,8 +24,7 @@ from .choice import Ladder
 from .scene_kernels import ladder_of, write_kernel
 from .step_control import control_of
 
-LARGEST_ROOM = 2**25
-"""Largest initial buffer for the section points of a block, in numbers (268 MB): a choice."""
+LARGEST_ROOM = 2**25  # largest initial buffer for the section points of a block, in numbers (268 MB): a choice
 
 
 @dataclass(slots=True)

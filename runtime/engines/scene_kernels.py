@@ -79,8 +79,7 @@ def write_kernel(reduction: ReducedScene, width: int | None = None, method: Inte
     return _emitted(reduction.equations, method, reduction.recording, width)
 
 
-_emitted = lru_cache(maxsize=32)(emit)
-"""`emit` with a cache; scenes that differ only in numbers share the text."""
+_emitted = lru_cache(maxsize=32)(emit)  # `emit` with a cache; scenes that differ only in numbers share the text
 
 
 def warn_of_chords(source: SweepKernel) -> None:

@@ -13,11 +13,9 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.plan import FIRST_STEP, Planner
 
-GROWN = 0.1
-"""Longest first step of a Rosenbrock method, relative to the time of growth by a factor e: a choice."""
-
+GROWN = 0.1  # longest first step of a Rosenbrock method, relative to the time of growth by a factor e: a choice
+# Numbers by which a kernel distinguishes the directions of a section.
 DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
-"""Numbers by which a kernel distinguishes the directions of a section."""
 
 
 def control_array(

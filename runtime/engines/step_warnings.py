@@ -14,11 +14,8 @@ from ..cells.plan import CellRows
 from ..support.status import Status
 from .choice import STIFF, Ladder
 
-FEW = 100
-"""There is no warning of short steps for a cell with fewer than FEW steps: a choice."""
-
-BLOWN = 1e6
-"""A motion counts as unbounded if it has grown by this factor and still grows at its fastest rate: a choice."""
+FEW = 100  # there is no warning of short steps for a cell with fewer than FEW steps: a choice
+BLOWN = 1e6  # a motion counts as unbounded if it has grown by this factor and still grows at its fastest rate: a choice
 
 
 def warn_of_steps(ladder: Ladder, buffers: Buffers, rows_of: Callable[[np.ndarray], CellRows]) -> None:

@@ -24,8 +24,8 @@ from .published import PAIRS, published_ranges
 
 NAMES = ("msf",)
 SIZE = (COLUMN, 4.4)
+# Largest strength alpha: the largest of the paper's two-oscillator probe, alpha = 2 sigma with sigma = 0.6.
 HIGHEST = 1.2
-"""Largest strength alpha: the largest of the paper's two-oscillator probe, alpha = 2 sigma with sigma = 0.6."""
 
 
 def curve(scene: Scene, runs: FigureRuns) -> MSF:

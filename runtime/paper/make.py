@@ -15,8 +15,7 @@ from . import load
 from . import names as all_names
 from .figure_runs import FULL, QUICK, FigureRuns
 
-AT_ONCE = 2
-"""Figures computed at a time: one uses the cores while the other compiles or computes a spectrum (a choice)."""
+AT_ONCE = 2  # figures computed at a time: one uses the cores while the other compiles or computes a spectrum (a choice)
 
 
 def make(names: Iterable[str] | None, out: str | PathLike[str], **options: Any) -> list[Path]:

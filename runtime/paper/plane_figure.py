@@ -24,12 +24,10 @@ from .figure_runs import FigureRuns
 
 NAMES = ("msf_plane",)
 SIZE = (COLUMN, 2.5)
+# Frequency, coupling at which the modes are marked, and size of the network (a choice).
 OMEGA, SIGMA, NODES = 1.40, 0.13, 4
-"""Frequency, coupling at which the modes are marked, and size of the network (a choice)."""
-TOP = 0.6
-"""Largest imaginary part beta of the grid."""
-FINE = 161
-"""Number of real parts alpha of the full grid."""
+TOP = 0.6  # largest imaginary part beta of the grid
+FINE = 161  # number of real parts alpha of the full grid
 
 
 def uneven_ring(n: int, back: Fraction = Fraction(1, 2)) -> Topology:

@@ -88,26 +88,41 @@ def draw(figure: Figure, data: Projection) -> tuple[Axes, Axes, Axes]:
     rays = figure.add_axes((middle, 0.40, right - middle, 0.51))
     probe = figure.add_axes((left[0], 0.40, left[1] - left[0], 0.51), sharey=rays)
     network = figure.add_axes((middle, 0.11, right - middle, 0.265), sharex=rays)
-    _draw_probe(probe, data)
+    bands(probe, data.probe.intervals, horizontal=True)
+    error = finite(data.probe.error)
+    probe.plot(error, data.probe.x, color=BLACK, linewidth=0.8)
+    top = float(np.nanmax(error, initial=0.0)) or 1.0
+    probe.set(xlim=(1.12 * top, -0.04 * top), ylabel=r"$|\alpha|$")
+    probe.set_xlabel(r"$e_{\mathrm{II}}$", labelpad=4)
+    probe.xaxis.set_major_locator(MaxNLocator(2))
+    probe.xaxis.set_label_position("top")
+    probe.tick_params(axis="x", labeltop=True, labelbottom=False)
     _draw_exponent(probe, data)
     _draw_rays(rays, data)
     _draw_network(network, data)
-    _draw_legend(probe, data)
+    # Draw the legend in the empty corner below the probe.
+    bars = [
+        Line2D([], [], color=color, marker="|", markersize=4, label=name)
+        for name, color in (("measured", BLUE), ("published", ORANGE))
+    ]
+    grey = [Patch(color=GREY, label="probe"), Patch(color=DARK, label="predicted")]
+    title = f"$n={data.scene.n}$\n$\\omega={data.scene.parameters['omega']:.2f}$\nsynchronous:"
+    legend = probe.legend(
+        handles=[*grey, *bars],
+        title=title,
+        fontsize=6.5,
+        title_fontsize=7,
+        handlelength=1.3,
+        borderpad=0,
+        loc="upper left",
+        bbox_to_anchor=(-0.45, -0.22),
+        labelspacing=0.5,
+        alignment="left",
+    )
+    legend.set_in_layout(False)
     failed = sum(int((~np.isfinite(s.error)).sum()) for s in (data.probe, data.network))
     note(rays, failures(failed, len(data.probe.x) + len(data.network.x)))
     return probe, rays, network
-
-
-def _draw_probe(axes: Axes, data: Projection) -> None:
-    bands(axes, data.probe.intervals, horizontal=True)
-    error = finite(data.probe.error)
-    axes.plot(error, data.probe.x, color=BLACK, linewidth=0.8)
-    top = float(np.nanmax(error, initial=0.0)) or 1.0
-    axes.set(xlim=(1.12 * top, -0.04 * top), ylabel=r"$|\alpha|$")
-    axes.set_xlabel(r"$e_{\mathrm{II}}$", labelpad=4)
-    axes.xaxis.set_major_locator(MaxNLocator(2))
-    axes.xaxis.set_label_position("top")
-    axes.tick_params(axis="x", labeltop=True, labelbottom=False)
 
 
 def _draw_exponent(axes: Axes, data: Projection) -> None:
@@ -179,26 +194,3 @@ def _draw_network(axes: Axes, data: Projection) -> None:
     axes.yaxis.set_major_locator(MaxNLocator(4, prune="upper"))
     bracket(axes, data.network.intervals, 0.91, BLUE)
     bracket(axes, data.published, 0.80, ORANGE)
-
-
-def _draw_legend(axes: Axes, data: Projection) -> None:
-    """Draw the legend in the empty corner below the probe."""
-    bars = [
-        Line2D([], [], color=color, marker="|", markersize=4, label=name)
-        for name, color in (("measured", BLUE), ("published", ORANGE))
-    ]
-    grey = [Patch(color=GREY, label="probe"), Patch(color=DARK, label="predicted")]
-    title = f"$n={data.scene.n}$\n$\\omega={data.scene.parameters['omega']:.2f}$\nsynchronous:"
-    legend = axes.legend(
-        handles=[*grey, *bars],
-        title=title,
-        fontsize=6.5,
-        title_fontsize=7,
-        handlelength=1.3,
-        borderpad=0,
-        loc="upper left",
-        bbox_to_anchor=(-0.45, -0.22),
-        labelspacing=0.5,
-        alignment="left",
-    )
-    legend.set_in_layout(False)

@@ -32,11 +32,8 @@ PUBLISHED = (
     Published(4, 1.40, ((0.153, 0.177),), "narrow window"),
 )
 
-PAIRS = (1.15, 1.40, 1.55)
-"""Frequencies at which the paper measures two oscillators."""
-
-NOT_PERIODIC = (1.40, 1.55)
-"""Frequencies for which the paper finds no synchronisation of five and more oscillators."""
+PAIRS = (1.15, 1.40, 1.55)  # frequencies at which the paper measures two oscillators
+NOT_PERIODIC = (1.40, 1.55)  # frequencies for which the paper finds no synchronisation of five and more oscillators
 
 
 def published(n: int, omega: float) -> Published | None:

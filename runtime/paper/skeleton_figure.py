@@ -34,17 +34,15 @@ from .figure_runs import FigureRuns
 
 EXTRA = ("skeleton",)
 SIZE = (COLUMN, 3.3)
-LOW, HIGH = 1.0, 1.9
-"""Lowest and highest frequency of the diagram."""
+LOW, HIGH = 1.0, 1.9  # lowest and highest frequency of the diagram
 PERIODS = (1, 2, 4)
 COLOURS = {1: PURPLE, 2: ORANGE, 4: BLUE}
 CLOUD = "#b4b4b4"
+# Magnified part of the diagram (ranges of frequency and position), and the rectangle of its inset in the axes.
 CROWDED, INSET = ((1.443, 1.484), (0.585, 0.611)), (0.11, 0.08, 0.36, 0.35)
-"""Magnified part of the diagram (ranges of frequency and position), and the rectangle of its inset in the axes."""
-SAME = 1e-9
-"""Bifurcations of one kind that two branches find within this distance of omega are one bifurcation."""
+SAME = 1e-9  # bifurcations of one kind that two branches find within this distance of omega are one bifurcation
+# Number of values of omega for the motion, for the continuation of orbits, and for the search of orbits.
 FULL = (901, 121, 16)
-"""Number of values of omega for the motion, for the continuation of orbits, and for the search of orbits."""
 
 
 @dataclass(frozen=True, slots=True)

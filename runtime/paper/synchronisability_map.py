@@ -30,8 +30,7 @@ from .published import PUBLISHED
 NAMES = ("synchronisability_map",)
 SIZE = (COLUMN, 4.7)
 NETWORKS = (("chain", 2), ("chain", 3), ("chain", 4), ("ring", 6), ("star", 5), ("complete", 5))
-LOW, HIGH, SIGMA = 1.0, 1.8, 0.6
-"""Lowest and highest frequency, and the largest coupling sigma."""
+LOW, HIGH, SIGMA = 1.0, 1.8, 0.6  # lowest and highest frequency, and the largest coupling sigma
 
 
 class Map(NamedTuple):

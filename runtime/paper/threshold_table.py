@@ -25,14 +25,12 @@ from .published import NOT_PERIODIC, PUBLISHED, Published, published
 
 NAMES = ("thresholds",)
 SIZE = (COLUMN, 4.8)
+# Kinds of ranges, with the colour and the height of their bars.
 KINDS = {"measured": (BLUE, 0.3), "predicted": (GREEN, 0.1), "exponents": (PURPLE, -0.1), "published": (ORANGE, -0.3)}
-"""Kinds of ranges, with the colour and the height of their bars."""
 COMPUTED = ("measured", "predicted", "exponents")
+# Largest gap in sigma between two ranges that count as one, since ends of chaotic ranges are ragged (a choice).
 GAP = 0.001
-"""Largest gap in sigma between two ranges that count as one, since ends of chaotic ranges are ragged (a choice)."""
-
-Ends = tuple[float | None, float | None]
-"""Ends of a range; None where there is no range, or no published number."""
+Ends = tuple[float | None, float | None]  # ends of a range; None where there is no range, or no published number
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,8 +21,7 @@ from .threshold_table import scene_of
 
 EXTRA = ("transient",)
 SIZE = (COLUMN, 3.6)
-LENGTHS = (0.1, 0.3, 1.0, 3.0)
-"""Lengths of transients, in units of the transient of the quality."""
+LENGTHS = (0.1, 0.3, 1.0, 3.0)  # lengths of transients, in units of the transient of the quality
 
 
 class Trial(NamedTuple):

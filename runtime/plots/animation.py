@@ -26,21 +26,13 @@ from .graph_picture import draw_graph
 from .result_plot import CYCLE, node_states, symbols
 from .style import BLACK, BLUE, GREY, ORANGE
 
-LARGEST = 200
-"""Largest number of oscillators on a graph that an animation shows."""
-ROW = 12
-"""Largest number of masses in a row on a belt; more oscillators are drawn as nodes of a graph."""
-TRAIL = 0.12
-"""Length of the trail of each point of the phase portrait, as a fraction of the shown time."""
-REACH = 0.3
-"""Largest displacement of a drawn mass, as a fraction of the distance between two masses."""
-STICK = 1e-3
-"""A mass sticks if its sliding speed is at most this fraction of the largest sliding speed."""
-
-FLASH = 3
-"""Number of frames in which a mass has a red edge after an impact."""
-WALL = 0.07
-"""Width of a drawn stop."""
+LARGEST = 200  # largest number of oscillators on a graph that an animation shows
+ROW = 12  # largest number of masses in a row on a belt; more oscillators are drawn as nodes of a graph
+TRAIL = 0.12  # length of the trail of each point of the phase portrait, as a fraction of the shown time
+REACH = 0.3  # largest displacement of a drawn mass, as a fraction of the distance between two masses
+STICK = 1e-3  # a mass sticks if its sliding speed is at most this fraction of the largest sliding speed
+FLASH = 3  # number of frames in which a mass has a red edge after an impact
+WALL = 0.07  # width of a drawn stop
 RED = "#c1121f"
 
 Update = Callable[[int], None]

@@ -16,9 +16,9 @@ from ..synchronisation.ensemble import APPROACHING, ENDS, ESCAPED, LEAVING, OTHE
 from .canvas import line_style
 from .style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, note, symbol
 
-KINDS = ("image", "shares", "starts")
-"""Kinds of plot, the default first where the basin has numbers for it."""
+KINDS = ("image", "shares", "starts")  # kinds of plot, the default first where the basin has numbers for it
 
+# Colours of attractors in turn: those of Okabe & Ito, then of Tol (https://personal.sron.nl/~pault).
 ATTRACTORS = (
     BLUE,
     ORANGE,
@@ -33,10 +33,9 @@ ATTRACTORS = (
     "#6A3D9A",
     "#B15928",
 )
-"""Colours of attractors in turn: those of Okabe & Ito, then of Tol (https://personal.sron.nl/~pault)."""
 
+# Colours of fates without an attractor; escaped starts have the colour of the axes.
 WITHOUT = {OTHER: "#8a8a8a", APPROACHING: "#c9c9c9", LEAVING: "#a6761d", STOPPED: "#5f5f5f", UNFINISHED: "#e6d8ad"}
-"""Colours of fates without an attractor; escaped starts have the colour of the axes."""
 
 
 def draw_basin(axes: Axes, value: Basin, kind: str | None, style: dict[str, Any]) -> Axes:

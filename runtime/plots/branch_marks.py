@@ -6,6 +6,7 @@ from typing import Any
 
 from ..bifurcation.kinds import BifurcationKind
 
+# Marker of each kind of bifurcation.
 MARKERS = {
     BifurcationKind.PERIOD_DOUBLING: "o",
     BifurcationKind.FOLD: "s",
@@ -15,7 +16,6 @@ MARKERS = {
     BifurcationKind.GRAZING: "^",
     BifurcationKind.STICK_LOSS: "v",
 }
-"""Marker of each kind of bifurcation."""
 STABLE: dict[str, Any] = {"linestyle": "-", "linewidth": 1.2}
 UNSTABLE: dict[str, Any] = {"linestyle": "--", "dashes": (2.5, 1.2), "linewidth": 0.8}
 MARK: dict[str, Any] = {

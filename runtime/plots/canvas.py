@@ -14,8 +14,7 @@ from matplotlib.lines import Line2D
 
 from .style import context, new_figure
 
-SIZE = (4.8, 3.4)
-"""Width and height in inches of figures without a window."""
+SIZE = (4.8, 3.4)  # width and height in inches of figures without a window
 
 
 @contextmanager
@@ -38,8 +37,8 @@ def axes_of(ax: Axes | None) -> Axes:
     return ax
 
 
+# Keywords of `scatter` and `pcolormesh` that are no properties of a Matplotlib artist.
 KEYWORDS = {"s", "c", "cmap", "norm", "vmin", "vmax", "shading"}
-"""Keywords of `scatter` and `pcolormesh` that are no properties of a Matplotlib artist."""
 
 
 def check_style(style: Mapping[str, Any], method: str, known: str) -> None:

@@ -18,8 +18,7 @@ from .branch_marks import MARK, MARKERS, STABLE, UNSTABLE
 from .canvas import line_style
 from .style import BLACK, BLUE, GREEN, ORANGE, PURPLE, symbol
 
-SHORT = 1e-6
-"""Window in which an observable of an equilibrium is recorded, in units of its fastest time (a choice)."""
+SHORT = 1e-6  # window in which an observable of an equilibrium is recorded, in units of its fastest time (a choice)
 
 
 def draw_branches(axes: Axes, branches: tuple[Branch, ...], y: str | None, style: dict[str, Any]) -> Axes:

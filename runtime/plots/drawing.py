@@ -40,14 +40,9 @@ from .plane import draw_plane
 from .result_plot import draw_result
 from .style import BLACK, BLUE, GREEN, GREY, ORANGE, bands, note, symbol
 
-SAMPLES = 400
-"""Points per drive period of a drawn orbit: enough for a smooth curve."""
-
-COLOURS = (BLUE, GREEN, BLACK, GREY)
-"""Colours of the nodes of an orbit."""
-
-DOTS: dict[str, Any] = {"linestyle": "none", "marker": "."}
-"""Style of points without a line."""
+SAMPLES = 400  # points per drive period of a drawn orbit: enough for a smooth curve
+COLOURS = (BLUE, GREEN, BLACK, GREY)  # colours of the nodes of an orbit
+DOTS: dict[str, Any] = {"linestyle": "none", "marker": "."}  # style of points without a line
 
 
 def drawn(value: HasPlot, ax: Axes | None, **style: Any) -> Axes:

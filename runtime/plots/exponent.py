@@ -14,8 +14,7 @@ from ..stability.msf import MSF
 from .canvas import line_style
 from .style import BLUE, ORANGE, bands
 
-MARKED = 60
-"""Most strengths that are marked with dots; more dots would hide the line."""
+MARKED = 60  # most strengths that are marked with dots; more dots would hide the line
 
 
 def draw_exponent(axes: Axes, function: MSF, sigma: float | None = None, **style: Any) -> Axes:

@@ -16,11 +16,8 @@ from synchain.models.graphs.families import FamilyRule
 from synchain.models.graphs.links import join
 from synchain.models.graphs.topology import Topology
 
-DENSE = 300
-"""Largest number of nodes with dense matrices, whose pseudo-inverse costs n^3 (a choice)."""
-
-ROUNDS = 80
-"""Number of steps of the majorisation (a choice)."""
+DENSE = 300  # largest number of nodes with dense matrices, whose pseudo-inverse costs n^3 (a choice)
+ROUNDS = 80  # number of steps of the majorisation (a choice)
 
 
 def positions(graph: Topology) -> np.ndarray:
@@ -86,6 +83,7 @@ def _sides(graph: Topology) -> np.ndarray:
     return np.concatenate(columns)
 
 
+# Layout functions of families; other graphs are drawn by eigenvectors.
 _FAMILIES: dict[str, Callable[[Topology], np.ndarray]] = {
     **dict.fromkeys(("ring", "one_way_ring", "complete", "circulant", "small_world"), _ring),
     **dict.fromkeys(("chain", "feed_forward"), _line),
@@ -95,7 +93,6 @@ _FAMILIES: dict[str, Callable[[Topology], np.ndarray]] = {
     "tree": _levels,
     "complete_bipartite": _sides,
 }
-"""Layout functions of families; other graphs are drawn by eigenvectors."""
 
 
 def _spectral(graph: Topology) -> np.ndarray:
@@ -129,7 +126,18 @@ def _eigenvectors(graph: Topology, members: np.ndarray) -> np.ndarray:
     laplacian = csgraph.laplacian(0.5 * (adjacency + adjacency.T))
     if len(members) <= DENSE:
         start = _fit(np.asarray(np.linalg.eigh(laplacian.toarray())[1][:, 1:3]))
-        return _majorise(start, csgraph.shortest_path(adjacency, directed=False, unweighted=True))
+        # Move nodes by majorisation until their distances approach the lengths (m, m) of shortest paths.
+        path_lengths = csgraph.shortest_path(adjacency, directed=False, unweighted=True)
+        scale = float(path_lengths.max()) / 2.0
+        points = scale * start + 0.05 * scale * _circle(len(start))  # separate coinciding nodes
+        # each step solves L_w x = L_pull x_old, weights 1/d² (Gansner, Koren & North)
+        weight = np.divide(1.0, path_lengths**2, where=path_lengths > 0.0, out=np.zeros_like(path_lengths))
+        inverse = np.linalg.pinv(np.diag(weight.sum(axis=1)) - weight)
+        for _ in range(ROUNDS):
+            now = np.linalg.norm(points[:, None] - points[None], axis=2)
+            pull = np.divide(weight * path_lengths, now, where=now > 0.0, out=np.zeros_like(now))
+            points = inverse @ ((np.diag(pull.sum(axis=1)) - pull) @ points)
+        return np.asarray(points)
     from scipy.sparse.linalg import eigsh
 
     # the Laplacian is singular, so shift to just below 0; a fixed start vector makes drawings reproducible
@@ -137,20 +145,6 @@ def _eigenvectors(graph: Topology, members: np.ndarray) -> np.ndarray:
     shift = -1e-3 * float(weights.mean())
     values, vectors = eigsh(laplacian.tocsc(), k=3, sigma=shift, v0=start)
     return np.asarray(vectors[:, np.argsort(values)[1:3]])
-
-
-def _majorise(points: np.ndarray, path_lengths: np.ndarray) -> np.ndarray:
-    """Move nodes by majorisation until their distances approach the lengths (m, m) of shortest paths."""
-    scale = float(path_lengths.max()) / 2.0
-    points = scale * points + 0.05 * scale * _circle(len(points))  # separate coinciding nodes
-    # each step solves L_w x = L_pull x_old, weights 1/d² (Gansner, Koren & North)
-    weight = np.divide(1.0, path_lengths**2, where=path_lengths > 0.0, out=np.zeros_like(path_lengths))
-    inverse = np.linalg.pinv(np.diag(weight.sum(axis=1)) - weight)
-    for _ in range(ROUNDS):
-        now = np.linalg.norm(points[:, None] - points[None], axis=2)
-        pull = np.divide(weight * path_lengths, now, where=now > 0.0, out=np.zeros_like(now))
-        points = inverse @ ((np.diag(pull.sum(axis=1)) - pull) @ points)
-    return np.asarray(points)
 
 
 def _fit(points: np.ndarray) -> np.ndarray:

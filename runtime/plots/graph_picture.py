@@ -20,32 +20,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
 
+# Colours of the kinds of nodes (Okabe & Ito).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-"""Colours of the kinds of nodes (Okabe & Ito)."""
-
-ALONE = "0.8"
-"""Colour of a node that is alone in its class."""
-
-NEGATIVE = "#D55E00"
-"""Colour of links with a negative weight."""
-
+ALONE = "0.8"  # colour of a node that is alone in its class
+NEGATIVE = "#D55E00"  # colour of links with a negative weight
+# Most nodes and lines of an SVG; a larger graph is described by its numbers of nodes and links.
 SVG_NODES, SVG_LINES = 300, 3000
-"""Most nodes and lines of an SVG; a larger graph is described by its numbers of nodes and links."""
-
-NUMBERED = 0.05
-"""Least radius of nodes that are drawn with labels."""
-
-LETTERS = 4
-"""Most letters of a label in a node."""
-
-POINTS = 60.0
-"""Size of a new figure: points per unit of the layout."""
-
-THIN, THICK = 0.7, 3.2
-"""Line widths in points of the smallest and the largest weight."""
-
-BEND = 0.18
-"""Distance of a bent line from the straight one, divided by its length."""
+NUMBERED = 0.05  # least radius of nodes that are drawn with labels
+LETTERS = 4  # most letters of a label in a node
+POINTS = 60.0  # size of a new figure: points per unit of the layout
+THIN, THICK = 0.7, 3.2  # line widths in points of the smallest and the largest weight
+BEND = 0.18  # distance of a bent line from the straight one, divided by its length
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,10 +13,9 @@ from ..stability.msf import Plane
 from .exponent import finite
 from .style import BLACK, symbol
 
-FAR = 100.0
-"""Coupling sigma at the end of a ray, far outside of the drawn plane; the limits of the axes cut the ray."""
+FAR = 100.0  # coupling sigma at the end of a ray, far outside of the drawn plane; the limits of the axes cut the ray
+# Labels of axes that are strengths of a mode.
 AXES = {"alpha": r"$\alpha=-\sigma\,\mathrm{Re}\,\gamma$", "beta": r"$\beta=-\sigma\,\mathrm{Im}\,\gamma$"}
-"""Labels of axes that are strengths of a mode."""
 RAY: dict[str, Any] = {"color": BLACK, "linestyle": "--", "linewidth": 0.8}
 DOT: dict[str, Any] = {
     "color": BLACK,

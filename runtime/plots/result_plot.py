@@ -22,24 +22,16 @@ from .canvas import axes_of, line_style
 from .graph_picture import draw_graph
 from .style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, bands, failures, note, symbol
 
+# Kinds of plot; the names of observables are kinds too.
 KINDS = ("error", "section", "map", "time", "phase", "space", "network", "end")
-"""Kinds of plot; the names of observables are kinds too."""
-CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
-"""Colours of oscillators, in turn."""
-REALISATION = "realisation"
-"""Name of the axis of random realisations."""
-FINEST = 1000
-"""Most drawn values on each axis of a map; longer axes are thinned."""
-ROUNDING = 1e-9
-"""Draw synchronisation errors below this value as zero."""
-DECADES = 1e3
-"""Ratio of the largest to the smallest error from which the scale is logarithmic."""
-MARKED = 60
-"""Largest number of cells drawn with a dot each: more dots would hide the line."""
-SHARP = 0.5
-"""Largest angle in radians between chords of a phase portrait that is drawn as a line: 12 samples a turn."""
-PAINT: dict[str, Any] = {"shading": "nearest", "cmap": "cividis", "rasterized": True}
-"""Style of colours over two axes."""
+CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)  # colours of oscillators, in turn
+REALISATION = "realisation"  # name of the axis of random realisations
+FINEST = 1000  # most drawn values on each axis of a map; longer axes are thinned
+ROUNDING = 1e-9  # draw synchronisation errors below this value as zero
+DECADES = 1e3  # ratio of the largest to the smallest error from which the scale is logarithmic
+MARKED = 60  # largest number of cells drawn with a dot each: more dots would hide the line
+SHARP = 0.5  # largest angle in radians between chords of a phase portrait that is drawn as a line: 12 samples a turn
+PAINT: dict[str, Any] = {"shading": "nearest", "cmap": "cividis", "rasterized": True}  # style of colours over two axes
 
 
 def draw_result(
@@ -71,22 +63,18 @@ def draw_result(
             )
         limits = axes.get_xlim()
         bands(axes, shaded)
-        _open_ends(axes, windows)
+        # Draw a dashed line and a note where windows end with the computed range (infinite error) and may continue.
+        for window in getattr(windows, "windows", windows):
+            for end, outside in (("low", "right"), ("high", "left")):
+                edge, error = getattr(window, end, math.inf), getattr(window, f"{end}_error", 0.0)
+                if error == math.inf and math.isfinite(edge):
+                    axes.axvline(edge, color=BLACK, linewidth=0.8, linestyle="--", zorder=0.5)
+                    axes.text(edge, 0.5, " not computed beyond ", transform=axes.get_xaxis_transform(), rotation=90,
+                              fontsize="x-small", ha=outside, va="center", clip_on=True)  # fmt: skip
         axes.set_xlim(limits)
     failed = int((result.data.status != Status.FINISHED).sum())
     note(axes, "; ".join(filter(None, [remark, failures(failed, result.data.status.size)])))
     return axes
-
-
-def _open_ends(axes: Axes, windows: Any) -> None:
-    """Draw a dashed line and a note where windows end with the computed range (infinite error) and may continue."""
-    for window in getattr(windows, "windows", windows):
-        for end, outside in (("low", "right"), ("high", "left")):
-            edge, error = getattr(window, end, math.inf), getattr(window, f"{end}_error", 0.0)
-            if error == math.inf and math.isfinite(edge):
-                axes.axvline(edge, color=BLACK, linewidth=0.8, linestyle="--", zorder=0.5)
-                axes.text(edge, 0.5, " not computed beyond ", transform=axes.get_xaxis_transform(), rotation=90,
-                          fontsize="x-small", ha=outside, va="center", clip_on=True)  # fmt: skip
 
 
 def _intervals(windows: object) -> list[tuple[float, float]]:

@@ -26,11 +26,10 @@ from ..support.files import whole_file
 
 BLACK, BLUE, ORANGE, GREEN, PURPLE, SKY = "#1a1a1a", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 GREY = "#d9d9d9"
-COLUMN = 3.46
-"""Width of one column in inches."""
-DPI = 300
-"""Resolution of PNG files, in dots per inch."""
+COLUMN = 3.46  # width of one column in inches
+DPI = 300  # resolution of PNG files, in dots per inch
 
+# Settings of matplotlib for all figures; all other settings have the defaults of matplotlib.
 SETTINGS: dict[str, Any] = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "Helvetica", "sans-serif"],
@@ -68,7 +67,6 @@ SETTINGS: dict[str, Any] = {
     "path.simplify": True,
     "image.composite_image": True,
 }
-"""Settings of matplotlib for all figures; all other settings have the defaults of matplotlib."""
 
 
 @contextmanager

@@ -33,6 +33,7 @@ from ..results.labelled import Labelled
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+# Style rules of all fragments; fragments inherit the colours of the page.
 STYLE = """
 .synchain{font-family:system-ui,sans-serif;line-height:1.45}
 .synchain table{border-collapse:collapse;margin:.4em 0}
@@ -47,16 +48,10 @@ vertical-align:middle}
 .synchain img{max-width:100%;background:#fff}
 .synchain .quiet{opacity:.75}
 """
-"""Style rules of all fragments; fragments inherit the colours of the page."""
 
-LINES, ROWS = 14, 12
-"""Most lines of equations, and most rows of a table (a choice)."""
-
-LONG = 400
-"""Most characters of LaTeX of an equation; a longer equation is shown as plain text, whose lines can break."""
-
-EXACT = 40
-"""Most nodes of a graph without a closed form whose spectrum is computed for display."""
+LINES, ROWS = 14, 12  # most lines of equations, and most rows of a table (a choice)
+LONG = 400  # most characters of LaTeX of an equation; a longer equation is shown as plain text, whose lines can break
+EXACT = 40  # most nodes of a graph without a closed form whose spectrum is computed for display
 
 PLAIN = ExpressionWriter(Latex(), {}, frozenset())
 

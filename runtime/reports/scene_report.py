@@ -36,11 +36,11 @@ img,svg,table,math{break-inside:avoid}details{display:none}}
 """
 
 
+# Tells the browser to run no script and to load nothing.
 POLICY = (
     '<meta http-equiv="Content-Security-Policy" '
     "content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">"
 )
-"""Tells the browser to run no script and to load nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +53,7 @@ class Effort:
     values: int | None = None  # largest number of values of each axis of the sweep; None for all values
 
 
-QUICK = Effort(strengths=61, precision=1e-2, periods=300.0, values=25)
-"""Effort for a first look."""
+QUICK = Effort(strengths=61, precision=1e-2, periods=300.0, values=25)  # effort for a first look
 
 
 def report(
@@ -71,8 +70,25 @@ def report(
         parts += [_section("Network and exact spectrum", body(scene.topology))]
         parts += [_section("Master stability function", _stability(scene, effort, workers, show_progress))]
     if scene.axes:
-        parts += [_section("Sweep", _sweep(scene, effort, workers, show_progress))]
-    parts += [_section("Provenance", _provenance(scene))]
+        # Run the sweep of the scene, thinned to the values of the effort, and return it as HTML.
+        thinned = scene.replace(axes=tuple(_thinned(axis, effort.values) for axis in scene.axes))
+        result = run(thinned, workers=workers, show_progress=show_progress)
+        plain = [None] if not scene.observe or {"sync_error", "section"} & set(scene.record) else []
+        pictures = "".join(
+            figure(partial(result.plot, kind=kind), kind or "sweep") for kind in (*plain, *scene.observe)
+        )
+        count = "" if thinned.cells == scene.cells else f"<p>{thinned.cells} of the scene's {scene.cells} cells.</p>"
+        sweep = f"{count}{rows_table(result.summary[1:3])}{pictures}"
+        parts += [_section("Sweep", sweep)]
+    rows = [
+        ("versions", versions()),
+        ("equations", scene.equations.digest),
+        ("kernel", kernel_source(scene).digest),
+        ("seed", str(scene.rng)),
+    ]
+    text = json.dumps(scene.as_dict(), indent=1)
+    provenance = f"{rows_table(rows)}<details><summary>the scene</summary><pre>{escape(text)}</pre></details>"
+    parts += [_section("Provenance", provenance)]
     head = f'<meta charset="utf-8">{POLICY}<meta name="viewport" content="width=device-width"><title>{title}</title>'
     content = "\n".join(parts)
     return (
@@ -118,30 +134,9 @@ def _fixed(scene: Scene) -> str:
     return f'<p class="quiet">{escape(text)}</p>' if moved else ""
 
 
-def _sweep(scene: Scene, effort: Effort, workers: int | None, show_progress: bool | None) -> str:
-    """Run the sweep of the scene, thinned to the values of the effort, and return it as HTML."""
-    thinned = scene.replace(axes=tuple(_thinned(axis, effort.values) for axis in scene.axes))
-    result = run(thinned, workers=workers, show_progress=show_progress)
-    plain = [None] if not scene.observe or {"sync_error", "section"} & set(scene.record) else []
-    pictures = "".join(figure(partial(result.plot, kind=kind), kind or "sweep") for kind in (*plain, *scene.observe))
-    count = "" if thinned.cells == scene.cells else f"<p>{thinned.cells} of the scene's {scene.cells} cells.</p>"
-    return f"{count}{rows_table(result.summary[1:3])}{pictures}"
-
-
 def _thinned(axis: Axis, most: int | None) -> Axis:
     """Thin an axis to at most `most` values, including both ends."""
     if most is None or len(axis) <= most:
         return axis
     indices = np.unique(np.linspace(0, len(axis) - 1, most).round().astype(int))
     return Axis(axis.name, tuple(axis.values[k] for k in indices))
-
-
-def _provenance(scene: Scene) -> str:
-    rows = [
-        ("versions", versions()),
-        ("equations", scene.equations.digest),
-        ("kernel", kernel_source(scene).digest),
-        ("seed", str(scene.rng)),
-    ]
-    text = json.dumps(scene.as_dict(), indent=1)
-    return f"{rows_table(rows)}<details><summary>the scene</summary><pre>{escape(text)}</pre></details>"

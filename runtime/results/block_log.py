@@ -33,21 +33,16 @@ from ..support.status import CODES, tally
 
 KIND = b"synchain blocks "
 MAGIC = KIND + b"3\n"
-PAGE = 4096
-"""Bytes of a page of the disk, the unit in which damage occurs."""
+PAGE = 4096  # bytes of a page of the disk, the unit in which damage occurs
 LINE = struct.Struct("<QI")
+# Head of a record: mark, block, bytes and CRC-32 of the numbers, cells, most section points, counts by status, CRC-32
+# of the head.
 HEAD = struct.Struct(f"<4sQQIII{CODES}QI")
-"""Head of a record: mark, block, bytes and CRC-32 of the numbers, cells, most section points, counts by status, CRC-32
-of the head.
-"""
 MARK = b"blk\0"
-PIECE = 2**20
-"""Bytes that are read at a time in the search for a mark."""
-MOST = 10**9
-"""Largest number of blocks, states and samples that a log may have: the largest number of cells of a sweep."""
+PIECE = 2**20  # bytes that are read at a time in the search for a mark
+MOST = 10**9  # largest number of blocks, states and samples that a log may have: the largest number of cells of a sweep
 AGAIN = "start again with overwrite (--overwrite)"
-FLUSH = 5.0
-"""Seconds between two flushes to the disk, which protect the file from a loss of power."""
+FLUSH = 5.0  # seconds between two flushes to the disk, which protect the file from a loss of power
 
 
 def is_block_log(path: str | os.PathLike[str]) -> bool:
@@ -123,26 +118,23 @@ class BlockLog:
             about = _about(file, path)
             places = np.full(about["blocks"], -1, dtype=np.int64)
             log = cls(Path(path), about, places, np.zeros(CODES, np.int64), file, file.tell())
-            log._scan()
+            # Find the records; new records are appended behind the last record with a correct head.
+            size = os.fstat(log._file.fileno()).st_size
+            for offset, head, sound in _records(log._file, log._end, size):
+                _, block, length, _, _, most, *statuses, _ = head
+                if sound and block < len(log.places):
+                    if log.places[block] >= 0:  # a block that was written twice after damage: the later record counts
+                        log.counts -= log._statuses(block)
+                    log.places[block] = offset
+                    log.counts += np.array(statuses)
+                    log.most = max(log.most, most)
+                log._end = offset + HEAD.size + length
             if writing:
                 file.truncate(log._end)  # drop a torn record at the end
         except BaseException:
             file.close()
             raise
         return log
-
-    def _scan(self) -> None:
-        """Find the records; new records are appended behind the last record with a correct head."""
-        size = os.fstat(self._file.fileno()).st_size
-        for offset, head, sound in _records(self._file, self._end, size):
-            _, block, length, _, _, most, *statuses, _ = head
-            if sound and block < len(self.places):
-                if self.places[block] >= 0:  # a block that was written twice after damage: the later record counts
-                    self.counts -= self._statuses(block)
-                self.places[block] = offset
-                self.counts += np.array(statuses)
-                self.most = max(self.most, most)
-            self._end = offset + HEAD.size + length
 
     def _statuses(self, block: int) -> np.ndarray:
         self._file.seek(int(self.places[block]))
@@ -156,7 +148,9 @@ class BlockLog:
     def append(self, block: int, buffers: Buffers) -> None:
         """Append a finished block; an OSError does not change the log."""
         counts, most = tally(buffers.status), buffers.most_points
-        body = _packed(buffers)
+        # Unused entries for section points are left out.
+        floats = (buffers.end, buffers.sums, buffers.points[_exists(buffers)], buffers.samples)
+        body = buffers.counts.astype("<i8").tobytes() + b"".join(part.astype("<f8").tobytes() for part in floats)
         head = HEAD.pack(MARK, block, len(body), zlib.crc32(body), len(buffers.counts), most, *counts.tolist(), 0)
         head = head[:-4] + struct.pack("<I", zlib.crc32(head[:-4]))
         self._file.seek(self._end)
@@ -218,7 +212,15 @@ def _about(file: FileIO, path: str | os.PathLike[str]) -> Description:
         if zlib.crc32(text) == check:
             first = len(MAGIC) + LINE.size + length
             file.seek(_second(first) + first)
-            return _description(text, path)
+            # Parse the first line as JSON; raise ValueError if a number that the log needs is missing.
+            try:
+                about = json.loads(text)
+            except (ValueError, RecursionError):
+                about = None
+            names = ("blocks", "dimension", "samples", "observed", "kept")
+            if isinstance(about, dict) and all(type(about.get(n)) is int and 0 <= about[n] <= MOST for n in names):
+                return cast(Description, about)
+            raise ValueError(f"{os.fspath(path)}: its first line does not say what its sweep is; {AGAIN}")
     if not starts:
         raise ValueError(f"{os.fspath(path)} is no unfinished run of synchain; choose another file, or {AGAIN}")
     if MAGIC not in starts:
@@ -226,18 +228,6 @@ def _about(file: FileIO, path: str | os.PathLike[str]) -> Description:
             f"{os.fspath(path)} was begun by another version of synchain; finish it with that one, or {AGAIN}"
         )
     raise ValueError(f"{os.fspath(path)}: both copies of its first line are damaged; {AGAIN}")
-
-
-def _description(text: bytes, path: str | os.PathLike[str]) -> Description:
-    """Parse the first line as JSON; raise ValueError if a number that the log needs is missing."""
-    try:
-        about = json.loads(text)
-    except (ValueError, RecursionError):
-        about = None
-    names = ("blocks", "dimension", "samples", "observed", "kept")
-    if isinstance(about, dict) and all(type(about.get(n)) is int and 0 <= about[n] <= MOST for n in names):
-        return cast(Description, about)
-    raise ValueError(f"{os.fspath(path)}: its first line does not say what its sweep is; {AGAIN}")
 
 
 def _records(file: FileIO, offset: int, size: int) -> Iterator[tuple[int, tuple[int, ...], bool]]:
@@ -265,12 +255,6 @@ def _next_mark(file: FileIO, offset: int, size: int) -> int:
             break
         offset += len(piece) - len(MARK) + 1  # pieces overlap by one byte less than a mark
     return size
-
-
-def _packed(buffers: Buffers) -> bytes:
-    """Return the numbers of a block as bytes; unused entries for section points are left out."""
-    floats = (buffers.end, buffers.sums, buffers.points[_exists(buffers)], buffers.samples)
-    return buffers.counts.astype("<i8").tobytes() + b"".join(part.astype("<f8").tobytes() for part in floats)
 
 
 def _exists(buffers: Buffers) -> np.ndarray:

@@ -7,8 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-NEAR = 1e-11
-"""Synchronisation error, relative to the size of the motion, below which a certified cell ends."""
+NEAR = 1e-11  # synchronisation error, relative to the size of the motion, below which a certified cell ends
 
 ERRORS = 3.5
 """Standard errors below 0 at which an exponent is certainly negative (a choice: an error probability of 2e-4).
@@ -16,15 +15,11 @@ ERRORS = 3.5
 For averages of few blocks Student's distribution replaces the normal one, at the same probability.
 """
 
-CHANCE = 1e-6
-"""Largest probability of a burst from NEAR to BURST at which a cell may end early (a choice)."""
+CHANCE = 1e-6  # largest probability of a burst from NEAR to BURST at which a cell may end early (a choice)
+BURST = 1e-6  # synchronisation error, relative to the size of the motion, that counts as a burst of a certified cell
+SYNCHRONOUS = 1e-3  # mean error below which a cell counts as synchronous, relative to the size of the motion
 
-BURST = 1e-6
-"""Synchronisation error, relative to the size of the motion, that counts as a burst of a certified cell."""
-
-SYNCHRONOUS = 1e-3
-"""Mean error below which a cell counts as synchronous, relative to the size of the motion."""
-
+# Verdicts on a cell; a result stores their indices.
 VERDICTS = (
     "did not finish",
     "synchronous, certified by the exponent",
@@ -35,7 +30,6 @@ VERDICTS = (
     "not synchronous although the state is stable: another attractor, or too short a transient",
     "synchronous on average, but not throughout, although the state is stable: bursts (bubbling), or too short a transient",
 )
-"""Verdicts on a cell; a result stores their indices."""
 
 
 @dataclass(frozen=True, slots=True)

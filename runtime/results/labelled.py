@@ -19,8 +19,7 @@ from .store import write_data
 if TYPE_CHECKING:
     from synchain.models.scenes.scene import Scene
 
-KIND, VALUE = "kind", "value"
-"""Attributes of a file: the class of the value, and its fields as JSON."""
+KIND, VALUE = "kind", "value"  # attributes of a file: the class of the value, and its fields as JSON
 
 
 class Labelled(HasPlot):

@@ -23,23 +23,16 @@ if TYPE_CHECKING:
 
     from ..cells.buffers import Buffers
 
+# Name, dimensions besides the dimensions of the sweep, values with one row for each cell.
 Variable = tuple[str, tuple[str, ...], np.ndarray]
-"""Name, dimensions besides the dimensions of the sweep, values with one row for each cell."""
-
-STATE = ("component", "node")
-"""The dimensions of a state."""
-
+STATE = ("component", "node")  # the dimensions of a state
+# Variable of the initial states of the cells, if these differ from the initial states of the scene.
 START_STATE = "start_state"
-"""Variable of the initial states of the cells, if these differ from the initial states of the scene."""
-
+# Coordinates of each cell: the time at which it stopped, and the phase of the drive there, from 0 to 1.
 END_TIME, DRIVE_PHASE = "end_time", "drive_phase"
-"""Coordinates of each cell: the time at which it stopped, and the phase of the drive there, from 0 to 1."""
-
+# Variables that are coordinates of other variables.
 TIMES = ("time", "section_time", "event_time", END_TIME, DRIVE_PHASE)
-"""Variables that are coordinates of other variables."""
-
-TEXTS = ("scene", "title", "equations", "kernel", "versions")
-"""Attributes of a result that are text."""
+TEXTS = ("scene", "title", "equations", "kernel", "versions")  # attributes of a result that are text
 
 MEANINGS = {
     "sync_error": "average synchronisation error",
@@ -77,8 +70,8 @@ MEANINGS = {
 }
 
 
+# Conventions of the attributes `long_name`, `units`, `flag_values`, `flag_masks` and `flag_meanings` of a result.
 CONVENTIONS = "CF-1.11"
-"""Conventions of the attributes `long_name`, `units`, `flag_values`, `flag_masks` and `flag_meanings` of a result."""
 
 DIMENSIONLESS = frozenset(
     {
@@ -91,8 +84,8 @@ DIMENSIONLESS = frozenset(
 
 States and errors have the units of the model and are dimensionless only in a model with a scaling."""
 
+# Variables that are states or distances of states.
 SCALED = frozenset({"end", "section", "trajectory", "sync_error", "sync_error_max", "sync_error_end"})
-"""Variables that are states or distances of states."""
 
 COUNTS = {
     "status": Count.STATUS,
@@ -101,16 +94,15 @@ COUNTS = {
     "periods_skipped": Count.SKIPPED,
     "section_count": Count.POINTS,
 }
+# The column of `counts` or `sums` of each variable.
 SUMS = {
     "sync_error": SumColumn.MEAN,
     "sync_error_max": SumColumn.PEAK,
     "sync_error_end": SumColumn.LAST,
     "end_time": SumColumn.STOPPED_AT,
 }
-"""The column of `counts` or `sums` of each variable."""
 
-TOLERANCES = ("rtol_used", "atol_used")
-"""Names of the variables of the columns of `Buffers.tolerances`."""
+TOLERANCES = ("rtol_used", "atol_used")  # names of the variables of the columns of `Buffers.tolerances`
 
 
 @dataclass(frozen=True, slots=True)

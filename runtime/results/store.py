@@ -30,17 +30,13 @@ from synchain.models.inputs.regular_file import open_regular
 from ..support.files import check_replaceable, synced, whole_file, whole_folder
 from ..support.netcdf import DIGEST, Sheet, is_sealed, seal, unsealed
 
+# The values of the dimension `part`, by which complex numbers are stored as pairs of real ones.
 PARTS = ("real", "imaginary")
-"""The values of the dimension `part`, by which complex numbers are stored as pairs of real ones."""
-
+# System errors for a full disk, an exhausted quota and a too large file.
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""System errors for a full disk, an exhausted quota and a too large file."""
-
-CHUNK = 2**15
-"""Numbers of a chunk (256 kB of doubles); one chunk is in memory at a time."""
-
+CHUNK = 2**15  # numbers of a chunk (256 kB of doubles); one chunk is in memory at a time
+# Function that writes a dataset to a path: variables with one of the dimensions chunk by chunk, others at once.
 Copy: TypeAlias = "Callable[[xr.Dataset, Path, Collection[str]], None]"
-"""Function that writes a dataset to a path: variables with one of the dimensions chunk by chunk, others at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +123,13 @@ def read_data(path: Path) -> xr.Dataset:
     with opened(path) as file, _readable(path):
         data = file.load().drop_encoding()  # so that a later file can choose another encoding
     data.attrs = attributes_of(data.attrs, path)
-    return _with_complex(data)
+    # Join the pairs of `_without_complex` to complex numbers.
+    joined = {
+        name: (values.dims[:-1], values.values[..., 0] + 1j * values.values[..., 1], values.attrs)
+        for name, values in data.data_vars.items()
+        if "part" in values.dims
+    }
+    return data.assign(joined).drop_vars("part") if joined else data
 
 
 def attributes_of(attributes: dict[str, object], path: Path) -> dict[str, object]:
@@ -372,16 +374,7 @@ def _without_complex(data: xr.Dataset) -> xr.Dataset:
     return data.assign(pairs).assign_coords(part=list(PARTS)) if pairs else data
 
 
-def _with_complex(data: xr.Dataset) -> xr.Dataset:
-    """Join the pairs of `_without_complex` to complex numbers."""
-    joined = {
-        name: (values.dims[:-1], values.values[..., 0] + 1j * values.values[..., 1], values.attrs)
-        for name, values in data.data_vars.items()
-        if "part" in values.dims
-    }
-    return data.assign(joined).drop_vars("part") if joined else data
-
-
+# The format of each ending.
 FORMS: dict[str, Form] = {
     ".nc": Form(None, check_replaceable, whole_file, _write_netcdf3, _rows_of_netcdf3, _seal_netcdf3, _open_netcdf3),
     ".nc4": Form(
@@ -403,4 +396,3 @@ FORMS: dict[str, Form] = {
         lambda path: _intact(path, "zarr"),
     ),
 }
-"""The format of each ending."""

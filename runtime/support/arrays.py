@@ -7,8 +7,7 @@ from numpy.typing import ArrayLike
 
 from synchain.models.inputs.checks import short_repr
 
-LARGEST = 1e300
-"""Largest size of a number in a row: sums, differences and multiples of them are finite."""
+LARGEST = 1e300  # largest size of a number in a row: sums, differences and multiples of them are finite
 
 
 def numbers(what: str, values: object, *, complex_too: bool = False) -> np.ndarray:

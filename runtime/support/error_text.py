@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import numpy as np
 
-LONGEST = 15
-"""Most decimals of a number; a smaller number is written with an exponent."""
+LONGEST = 15  # most decimals of a number; a smaller number is written with an exponent
 
 
 def with_error(value: float, error: float = 0.0) -> str:

@@ -18,14 +18,12 @@ import numpy as np
 import xarray as xr
 from scipy.io import netcdf_file
 
-DIGEST = "digest"
-"""Name of the attribute that holds the SHA-256 of the file, in hexadecimal digits."""
+DIGEST = "digest"  # name of the attribute that holds the SHA-256 of the file, in hexadecimal digits
 BLANK = "0" * 64
 
 DIMENSION, VARIABLE, ATTRIBUTE, ABSENT = (struct.pack(">i", tag) for tag in (10, 11, 12, 0))
 TYPES = {"b": 1, "c": 2, "h": 3, "i": 4, "l": 4, "f": 5, "d": 6}
-PIECE = 2**20
-"""Bytes that are read at a time."""
+PIECE = 2**20  # bytes that are read at a time
 LARGEST = 2**32 - 4
 """Bytes of the largest variable whose size fits into the header.
 

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-EVERY = 60.0
-"""Seconds between two lines if stderr is no terminal."""
+EVERY = 60.0  # seconds between two lines if stderr is no terminal
 
 
 @dataclass(frozen=True, slots=True)

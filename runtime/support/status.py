@@ -6,8 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
-CODES = 16
-"""Length of arrays of counts by status code, also in files; longer than needed, so that codes can be added."""
+CODES = 16  # length of arrays of counts by status code, also in files; longer than needed, so that codes can be added
 
 
 class Status(IntEnum):

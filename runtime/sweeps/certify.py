@@ -38,19 +38,15 @@ from .pool import Task
 from .prepare import PreparedRun
 from .scheduler import BlockScheduler, Sink
 
+# Largest number of cells of a certified sweep: a choice; exponents and verdicts of all cells are in memory.
 MOST = 10**7
-"""Largest number of cells of a certified sweep: a choice; exponents and verdicts of all cells are in memory."""
-
+# Transient before the average along an orbit, in units of time, and relative tolerance: choices for speed.
 TRANSIENT, RTOL = 300, 1e-6
-"""Transient before the average along an orbit, in units of time, and relative tolerance: choices for speed."""
-
+# LOOKED: number of samples by which motions are distinguished. STARTS: number of cells of one motion along which
+# exponents are averaged. Choices.
 LOOKED, STARTS = 64, 4
-"""LOOKED: number of samples by which motions are distinguished. STARTS: number of cells of one motion along which
-exponents
-are averaged. Choices."""
-
+# Two motions count as one if their means differ by less than CLOSE times the extent of all motions of a group: a choice.
 CLOSE = 1e-3
-"""Two motions count as one if their means differ by less than CLOSE times the extent of all motions of a group (a choice)."""
 
 
 @dataclass

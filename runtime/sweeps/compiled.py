@@ -37,8 +37,8 @@ from ..results.labels import States, provenance, sample_times
 from ..results.result import Result, gather
 from .sensitivities import Sensitivities, base_of
 
+# Steps of a cell from which a call looks for stiffness: a choice; the check takes about as long as 500 steps.
 LONG = 1024
-"""Steps of a cell from which a call looks for stiffness: a choice; the check takes about as long as 500 steps."""
 
 
 def compile(
@@ -406,8 +406,8 @@ class CompiledResult:
         return table.reshape(*self.shape, *table.shape[1:])
 
 
+# Names of a compiled result that no observable may have.
 RESERVED = ("t", "y", "status", "d", "run", "values", "shape", "rows", "buffers")
-"""Names of a compiled result that no observable may have."""
 
 
 def _names(what: str, names: Iterable[str]) -> tuple[str, ...]:

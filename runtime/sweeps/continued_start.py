@@ -18,17 +18,13 @@ from ..results.labels import DRIVE_PHASE, END_TIME, STATE, States, coordinates, 
 from ..results.result import Result
 from ..support.arrays import row
 
+# Types of the argument `start`.
 StartValue: TypeAlias = Result | xr.DataArray | Mapping[str, object] | Sequence[float] | np.ndarray
-"""Types of the argument `start`."""
-
+# Name of an attribute, or coordinate, of results: the time of the earlier run at which the run started.
 START_TIME = "start_time"
-"""Name of an attribute, or coordinate, of results: the time of the earlier run at which the run started."""
-
+# A number of drive periods within this distance of a whole number counts as whole: a choice far above rounding.
 WHOLE = 1e-9
-"""A number of drive periods within this distance of a whole number counts as whole: a choice far above rounding."""
-
-CELLS = 65536
-"""Number of cells of a continued sweep whose periods are computed at once; bounds the memory."""
+CELLS = 65536  # number of cells of a continued sweep whose periods are computed at once; bounds the memory
 
 
 def started(scene: Scene, start: StartValue) -> tuple[Scene, float]:

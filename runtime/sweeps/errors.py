@@ -8,8 +8,8 @@ from contextlib import contextmanager
 
 from ..results.result import Result
 
+# An error from one of these packages means that workers, or the connection to workers, are lost.
 ELSEWHERE = ("distributed", "dask", "tornado", "mpi4py")
-"""An error from one of these packages means that workers, or the connection to workers, are lost."""
 
 
 class SweepInterrupted(KeyboardInterrupt):

@@ -16,8 +16,7 @@ from ..engines.job import Job
 from ..support.execution import Execution
 from .worker import forget, run_block
 
-LOOK = 0.2
-"""Seconds between two checks for Ctrl-C while waiting for a block: a choice below what a user notices."""
+LOOK = 0.2  # seconds between two checks for Ctrl-C while waiting for a block: a choice below what a user notices
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,11 +28,10 @@ class Task:
     arguments: tuple[object, ...]
 
 
+# A task that was sent to a worker; the result is None if the worker has not yet received the job.
 Running = Future[Buffers | None]
-"""A task that was sent to a worker; the result is None if the worker has not yet received the job."""
-
+# Store the results of a task; return the task that waited for it, or None.
 Finish = Callable[[Task, Buffers], Task | None]
-"""Store the results of a task; return the task that waited for it, or None."""
 
 
 class WorkerPool:

@@ -50,14 +50,11 @@ LOST = 1e-3
 Beyond it the state itself has no three digits.
 """
 
+# Growth over the second half of a run that counts as exponential: a fifth power of time grows as much.
 EXPONENTIAL = 32.0
-"""Growth over the second half of a run that counts as exponential: a fifth power of time grows as much."""
-
-ROOM = 64
-"""Extremes of a cell that the buffers hold at first: a choice."""
-
+ROOM = 64  # extremes of a cell that the buffers hold at first: a choice
+# How the rate of a value passes zero at its extremes, and which of them is the observable.
 EXTREMES = {ObservedWindow.MAXIMUM: ("falling", np.argmax), ObservedWindow.MINIMUM: ("rising", np.argmin)}
-"""How the rate of a value passes zero at its extremes, and which of them is the observable."""
 
 
 @dataclass(frozen=True, slots=True)

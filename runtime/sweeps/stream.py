@@ -49,8 +49,8 @@ from .pool import Task
 from .prepare import PreparedRun, prepare
 from .scheduler import BlockScheduler, Sink
 
+# Expected number of threads of a job in a job array (a choice); a part is divided into blocks for this number.
 JOB_THREADS = 8
-"""Expected number of threads of a job in a job array (a choice); a part is divided into blocks for this number."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)

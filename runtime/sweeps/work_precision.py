@@ -24,8 +24,7 @@ from ..support.status import Status
 from .memory import Memory
 from .prepare import prepare
 
-FINEST = 1e-13
-"""Tolerance of the run that the others are compared with: a choice, above the rounding of long runs."""
+FINEST = 1e-13  # tolerance of the run that the others are compared with: a choice, above the rounding of long runs
 
 
 @dataclass(frozen=True, slots=True, repr=False)
