@@ -40,12 +40,11 @@ Index: TypeAlias = Callable[[int], Expression]  # returns the index of a compone
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """A node, or a link with its target and its source.
+    """A node, or a link with its target and its source."""
 
-    here, there: index in the state of a component of the target (or of the node itself), and of the source. loads: the
-    expression from which each symbol is read. title: title of the block; empty for the site of a loop. node, link: the
-    node or link whose templates are used.
-    """
+    # here, there: index in the state of a component of the target (or of the node itself), and of the source. loads:
+    # the expression from which each symbol is read. title: title of the block; empty for the site of a loop. node,
+    # link: the node or link whose templates are used.
 
     here: Index
     loads: Mapping[sp.Symbol, Expression]

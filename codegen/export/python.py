@@ -140,10 +140,8 @@ def _events(events: EventText, numbers: Mapping[str, float]) -> list[str]:
 
 
 def _defaults(model: Equations, numbers: Mapping[str, float]) -> dict[str, str]:
-    """Return the parameters that a function takes, each with its value, "" without values.
-
-    In a large network, a parameter that differs between nodes or links is one sequence.
-    """
+    """Return the parameters that a function takes, each with its value, "" without values."""
+    # In a large network, a parameter that differs between nodes or links is one sequence.
     if is_unrolled(model):
         return {name: repr(numbers[name]) if numbers else "" for name in model.parameters}
     sequences = {name: [f"{name}_{i + 1}" for i in range(model.n)] for name in model.varied}
@@ -163,11 +161,9 @@ def _function(name: str, arguments: str, docstring: str, body: list[Statement]) 
 
 
 def _dense_places(model: Equations) -> list[str]:
-    """Return lines with the rows and columns of the entries of jac that can differ from zero.
-
-    In the rows that M couples, all entries count: solving with M makes each of these rates depend on all of their
-    terms.
-    """
+    """Return lines with the rows and columns of the entries of jac that can differ from zero."""
+    # In the rows that M couples, all entries count: solving with M makes each of these rates depend on all of their
+    # terms.
     heavy = {row for (row, column), e in model.mass().items() if e != sp.Integer(row == column)}
     places = sorted(set(model.jacobian()) | {(row, column) for row in heavy for column in range(model.dimension)})
     if not places:

@@ -18,11 +18,10 @@ from .emitter import TypedFunction
 
 
 class _LinkedCode(JITCodeLibrary):
-    """LLVM code of an inner function: callers link it, and it is optimised as a part of the entry point.
+    """LLVM code of an inner function: callers link it, and it is optimised as a part of the entry point."""
 
-    Numba optimises each function and generates its machine code before it links the function into its callers, where
-    both are done again.  Nothing calls the first machine code, and so this class skips it.
-    """
+    # Numba optimises each function and generates its machine code before it links the function into its callers, where
+    # both are done again. Nothing calls the first machine code, and so this class skips it.
 
     def _optimize_final_module(self) -> None:
         pass

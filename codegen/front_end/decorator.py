@@ -14,10 +14,8 @@ front_end_problems: list[str] = []
 
 
 def uses_front_end() -> bool:
-    """Return False if SYNCHAIN_FRONT_END chooses Numba's own pipeline.
-
-    Raises ValueError if SYNCHAIN_FRONT_END is neither empty nor "numba".
-    """
+    """Return False if SYNCHAIN_FRONT_END chooses Numba's own pipeline."""
+    # Raises ValueError if SYNCHAIN_FRONT_END is neither empty nor "numba".
     choice = os.environ.get("SYNCHAIN_FRONT_END", "")
     if choice not in ("", "numba"):
         raise ValueError(f"SYNCHAIN_FRONT_END: found {choice!r}; expected 'numba' or nothing; unset it")

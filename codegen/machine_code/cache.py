@@ -41,10 +41,8 @@ LOCK_TIMEOUT = 120.0
 
 
 def cache_folder() -> Path:
-    """Return the folder of compiled kernels: SYNCHAIN_CACHE, or `synchain` in the user's cache folder.
-
-    The folder may not exist yet.
-    """
+    """Return the folder of compiled kernels: SYNCHAIN_CACHE, or `synchain` in the user's cache folder."""
+    # The folder may not exist yet.
     wish = os.environ.get("SYNCHAIN_CACHE", "")
     if wish:
         return Path(wish).expanduser().absolute()
@@ -156,11 +154,9 @@ class Folder:
 
     @contextmanager
     def locked(self, name: str) -> Iterator[None]:
-        """Let one process at a time compile the module `name`; the others wait, and then load it.
-
-        The operating system frees the lock of a process that ends.  Without locks, or after LOCK_TIMEOUT, two processes
-        compile the module, with the same result.
-        """
+        """Let one process at a time compile the module `name`; the others wait, and then load it."""
+        # The operating system frees the lock of a process that ends. Without locks, or after LOCK_TIMEOUT, two
+        # processes compile the module, with the same result.
         lock = f"{name}.lock"
         flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
         descriptor = None

@@ -59,10 +59,9 @@ if hasattr(os, "register_at_fork"):
 
 
 class EntryPoint(Protocol):
-    """The compiled entry point of a driver: `drive` of a sweep, `march` of a kernel of modes.
+    """The compiled entry point of a driver: `drive` of a sweep, `march` of a kernel of modes."""
 
-    Its text describes its arguments: the functions of a scene, sizes, cells and arrays.
-    """
+    # Its text describes its arguments: the functions of a scene, sizes, cells and arrays.
 
     def __call__(self, /, *arguments: Any) -> None: ...
 
@@ -135,12 +134,8 @@ _modules: WeakValueDictionary[str, Compiled] = WeakValueDictionary()
 
 
 def load(source: KernelSource) -> Kernel:
-    """Compile a kernel, or load its machine code from the cache.
-
-    Notes
-    -----
-    A kernel whose cache file is damaged is compiled anew.
-    """
+    """Compile a kernel, or load its machine code from the cache."""
+    # A kernel whose cache file is damaged is compiled anew.
     _check_numba()
     return _load(source)
 
@@ -153,10 +148,8 @@ def load_shared(part: Driver | Recorder) -> Compiled:
 
 
 def forget() -> None:
-    """Forget the kernels and drivers of this process; the next `load` reads the cache folder.
-
-    Kernels and drivers that are not in use are freed.
-    """
+    """Forget the kernels and drivers of this process; the next `load` reads the cache folder."""
+    # Kernels and drivers that are not in use are freed.
     with _lock:
         _load.cache_clear()
         _shared.cache_clear()
@@ -269,10 +262,9 @@ def _stored(text: str, name: str, wanted: dict[str, Any], folder: Folder, path: 
 
 @dataclass(frozen=True, slots=True)
 class _FunctionCache:
-    """The cache of one function, with the interface that Numba's dispatcher expects, in the code of its module.
+    """The cache of one function, with the interface that Numba's dispatcher expects, in the code of its module."""
 
-    Numba's own cache reads and writes files by their paths, unsigned.
-    """
+    # Numba's own cache reads and writes files by their paths, unsigned.
 
     code: dict[Any, Any]  # compiled functions in the form that can be pickled, by name, types and processor
     name: str
@@ -289,10 +281,8 @@ class _FunctionCache:
 
 
 def _compile(text: str, path: Path, wanted: dict[str, Any], stored: bytes = b"") -> tuple[Compiled, dict[Any, Any]]:
-    """Compile functions of a module, or rebuild them from stored machine code; return them and their code.
-
-    The text comes from memory, not from the file at `path` and not from `__pycache__`.
-    """
+    """Compile functions of a module, or rebuild them from stored machine code; return them and their code."""
+    # The text comes from memory, not from the file at `path` and not from `__pycache__`.
     module = ModuleType(path.stem)
     module.__file__ = str(path)
     sys.modules[path.stem] = module  # Numba and pickle look the functions up there

@@ -8,13 +8,8 @@ from ..simd import lane_types
 
 
 def processor() -> str:
-    """Return name and features of the processor, as LLVM calls them, for example "znver3: aes avx avx2".
-
-    Notes
-    -----
-    NUMBA_CPU_NAME, NUMBA_CPU_FEATURES and NUMBA_ENABLE_AVX choose another processor, for which Numba
-    then compiles.
-    """
+    """Return name and features of the processor, as LLVM calls them, for example "znver3: aes avx avx2"."""
+    # NUMBA_CPU_NAME, NUMBA_CPU_FEATURES and NUMBA_ENABLE_AVX choose another processor, for which Numba then compiles.
     name = numba.config.CPU_NAME or lane_types.HOST_NAME
     if numba.config.CPU_FEATURES is not None:
         features = [word[1:] for word in numba.config.CPU_FEATURES.split(",") if word.startswith("+")]

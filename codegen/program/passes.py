@@ -36,10 +36,9 @@ class Names:
 
 @dataclass
 class Hoist:
-    """Replace each largest subexpression without `moving` symbols by a name; equal subexpressions share a name.
+    """Replace each largest subexpression without `moving` symbols by a name; equal subexpressions share a name."""
 
-    table: the name of each replaced expression. A single symbol is replaced only if it is in `renamed`.
-    """
+    # table: the name of each replaced expression. A single symbol is replaced only if it is in `renamed`.
 
     moving: frozenset[sp.Symbol]
     supply: Iterator[sp.Symbol]

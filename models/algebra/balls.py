@@ -55,10 +55,8 @@ def accurate(ball_at: Callable[[int], Ball], bits: int) -> Ball:
 
 
 def nearest(ball_at: Callable[[int], Ball]) -> float | complex:
-    """Return the value as a float, within 0.5001 units in the last place.
-
-    For a complex value the error is relative to the modulus.  Raises ValueError like `accurate`.
-    """
+    """Return the value as a float, within 0.5001 units in the last place."""
+    # For a complex value the error is relative to the modulus. Raises ValueError like `accurate`.
     ball = accurate(ball_at, 72)
     if isinstance(ball, arb):
         return float(ball.mid())
@@ -66,10 +64,8 @@ def nearest(ball_at: Callable[[int], Ball]) -> float | complex:
 
 
 def decimals(ball_at: Callable[[int], Ball], digits: int) -> sp.Expr:
-    """Return the value as a SymPy Float of `digits` digits, correct to one unit of the last digit.
-
-    A complex value is returned as real + imaginary * I.  Raises ValueError like `accurate`.
-    """
+    """Return the value as a SymPy Float of `digits` digits, correct to one unit of the last digit."""
+    # A complex value is returned as real + imaginary * I. Raises ValueError like `accurate`.
     bits = int(3.33 * digits) + 12
     ball = accurate(ball_at, bits)
     with precision(2 * bits):

@@ -90,10 +90,8 @@ class AngleSum:
         return lcm(*(t.denominator for t, _ in self.terms))
 
     def sign(self) -> int:
-        """Return the exact sign: -1, 0 or 1.
-
-        Evaluate certified balls; if they contain 0, test the number for 0 with the cyclotomic polynomial.
-        """
+        """Return the exact sign: -1, 0 or 1."""
+        # Evaluate certified balls; if they contain 0, test the number for 0 with the cyclotomic polynomial.
         number = self.folded
         if not number.terms:
             return (number.shift > 0) - (number.shift < 0)
@@ -147,10 +145,8 @@ _RATIONAL = {1: 2, 2: -2, 3: -1, 4: 0, 6: 1}
 
 
 def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]]:
-    """Merge equal numbers and add their multiplicities; return them in descending order.
-
-    Nearly equal numbers are compared exactly.
-    """
+    """Merge equal numbers and add their multiplicities; return them in descending order."""
+    # Nearly equal numbers are compared exactly.
     counts: dict[AngleSum, int] = {}
     for number, times in numbers:
         counts[number] = counts.get(number, 0) + times
@@ -174,11 +170,9 @@ def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]
 
 
 def box(sizes: Sequence[int], closed: Sequence[bool]) -> LazyEigenvalues[tuple[sp.Expr, int]]:
-    """Return the spectrum of the Cartesian product of chains and rings: sums of -4 sin², one for each direction.
-
-    `closed[k]` is True if direction k is a ring.  Numbers are compared exactly only if their floats
-    are too close.
-    """
+    """Return the spectrum of the Cartesian product of chains and rings: sums of -4 sin², one for each direction."""
+    # `closed[k]` is True if direction k is a ring. Numbers are compared exactly only if their floats are too close.
+    #
     # A wave (r, multiplicity) is one 2 cos(2πr/unit) of a direction.  Equal directions form multisets of waves.
     kinds = Counter(zip(sizes, closed, strict=True))
     unit = lcm(*(size if ring else 2 * size for size, ring in kinds))
@@ -269,10 +263,8 @@ def expressions(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[sp.Expr, 
 
 
 def read(number: sp.Expr) -> AngleSum | None:
-    """Convert a SymPy expression to a sum of cosines.
-
-    Return None for an expression that is no such sum, or has radicals other than those of `cosines.cosine`.
-    """
+    """Convert a SymPy expression to a sum of cosines."""
+    # Return None for an expression that is no such sum, or has radicals other than those of `cosines.cosine`.
     total = AngleSum.rational(0)
     for part in sp.Add.make_args(number):
         factor, core = part.as_coeff_Mul()
@@ -313,12 +305,10 @@ def _atoms() -> dict[sp.Expr, AngleSum]:
 
 
 def minimal_polynomial(number: AngleSum) -> fmpq_poly:
-    """Return the monic minimal polynomial over the rationals.
-
-    Multiply (z - conjugate) over all multiples of the angles; the product is a power of the minimal
-    polynomial.  Scaled by a common denominator, the number is an algebraic integer, so the coefficients
-    of the product are integers, which balls determine exactly.
-    """
+    """Return the monic minimal polynomial over the rationals."""
+    # Multiply (z - conjugate) over all multiples of the angles; the product is a power of the minimal polynomial.
+    # Scaled by a common denominator, the number is an algebraic integer, so the coefficients of the product are
+    # integers, which balls determine exactly.
     if not number.terms:
         return fmpq_poly([-to_flint(number.shift), 1])
     scale = lcm(number.shift.denominator, *(b.denominator for _, b in number.terms))

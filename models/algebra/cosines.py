@@ -63,10 +63,8 @@ def cosine(a: Fraction, b: Fraction, k: int, m: int) -> sp.Expr:
 
 
 def linear_cosine(expression: sp.Expr) -> tuple[Fraction, Fraction, int, int] | None:
-    """Return (a, b, k, m) for an expression a + 2 b cos(2πk/m), also one with sin² or cos².
-
-    Return None for any other expression.
-    """
+    """Return (a, b, k, m) for an expression a + 2 b cos(2πk/m), also one with sin² or cos²."""
+    # Return None for any other expression.
     shift, scaled = expression.as_coeff_Add()
     factor, core = scaled.as_coeff_Mul()
     squared = isinstance(core, sp.Pow) and core.exp == 2
@@ -104,10 +102,8 @@ def minimal_polynomial(a: Fraction, b: Fraction, m: int, conjugates: fmpz_poly |
 
 
 def exponential_roots(polynomial: fmpq_poly) -> list[sp.Expr] | None:
-    """Write all roots of a monic irreducible polynomial of degree >= 2 as a + exp(2πik/m).
-
-    Return None if the roots do not have this form.
-    """
+    """Write all roots of a monic irreducible polynomial of degree >= 2 as a + exp(2πik/m)."""
+    # Return None if the roots do not have this form.
     degree = polynomial.degree()
     for m in _moduli(degree):
         cyclotomic = fmpz_poly.cyclotomic(m)
@@ -120,11 +116,9 @@ def exponential_roots(polynomial: fmpq_poly) -> list[sp.Expr] | None:
 
 
 def cosine_roots(polynomial: fmpq_poly) -> list[sp.Expr] | None:
-    """Write all roots of a monic irreducible polynomial of degree >= 2 as a + 2 b cos(2πk/m), descending.
-
-    Return None if the roots do not have this form.  For each m with the right degree compute a and b
-    from the mean and the mean square deviation of the roots; comparing polynomials proves the form.
-    """
+    """Write all roots of a monic irreducible polynomial of degree >= 2 as a + 2 b cos(2πk/m), descending."""
+    # Return None if the roots do not have this form. For each m with the right degree compute a and b from the mean and
+    # the mean square deviation of the roots; comparing polynomials proves the form.
     degree = polynomial.degree()
     for m in _moduli(2 * degree):
         # b² is the ratio of the deviations.  Only b > 0 is needed: -2 cos x = 2 cos(π - x), with another m.
@@ -173,10 +167,9 @@ def written(factor: fmpq_poly) -> list[sp.Expr] | None:
 
 
 def biquadratic(monic: fmpq_poly) -> list[sp.Expr] | None:
-    """Write the real roots of a quartic as a ± sqrt(b ± sqrt(c)) or a ± sqrt(b) ± sqrt(c).
-
-    Return None if the roots do not have this form.
-    """
+    """Write the real roots of a quartic as a ± sqrt(b ± sqrt(c)) or a ± sqrt(b) ± sqrt(c)."""
+    # Return None if the roots do not have this form.
+    #
     # Shift z to remove the cubic term; the form exists only if z⁴ + p z² + q remains, without linear term.
     shift = monic[3] / 4
     even = monic(fmpq_poly([-shift, 1]))

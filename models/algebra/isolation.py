@@ -45,10 +45,9 @@ class Disc:
 
 
 def discs(f: fmpz_poly) -> list[Disc] | None:
-    """Return one disc for each root of a polynomial, real roots first; None if isolation fails.
-
-    No two discs touch, even if enlarged four times.
-    """
+    """Return one disc for each root of a polynomial, real roots first; None if isolation fails."""
+    # No two discs touch, even if enlarged four times.
+    #
     # Shift the origin to the mean of the roots, where evaluating the polynomial cancels least.
     mean = -f[f.degree() - 1] // (f.degree() * f[f.degree()])
     shifted = [(middle, f(fmpz_poly([middle, 1]))) for middle in (mean, fmpz(0))]

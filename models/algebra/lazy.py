@@ -11,10 +11,7 @@ T = TypeVar("T", covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class LazyEigenvalues(Sequence[T]):
-    """The distinct real eigenvalues of a graph in descending order, each computed on access.
-
-    A slice returns a list.
-    """
+    """The distinct real eigenvalues of a graph in descending order, each computed on access. A slice returns a list."""
 
     length: int  # number of items
     n: int  # number of nodes of the graph

@@ -93,10 +93,8 @@ class ComplexRoot(Root):
 
 @lru_cache(maxsize=64)
 def polynomial_text(polynomial: Polynomial) -> str:
-    """Write the polynomial in x like SymPy.
-
-    If Python refuses to convert a coefficient to text, write the degree and the size of the coefficients.
-    """
+    """Write the polynomial in x like SymPy."""
+    # If Python refuses to convert a coefficient to text, write the degree and the size of the coefficients.
     longest = max(abs(c).bit_length() for c in polynomial)
     if longest > _WRITTEN:
         return f"polynomial of degree {len(polynomial) - 1} with coefficients of up to {longest} bits"

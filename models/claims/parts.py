@@ -124,12 +124,9 @@ _RELATIONS: dict[str, Callable[[int, int], bool]] = {"=": eq, "<": lt, ">": gt, 
 
 
 def verify_parts(graph: Topology, parts: Sequence[PartClaim]) -> tuple[tuple[str, ...], bool, str]:
-    """Compare claimed parts with the spectrum of a graph.
-
-    Chains, rings, grids, tori and Cartesian products of families need no list of eigenvalues: extreme
-    eigenvalues are sums of extreme eigenvalues of the factors.  Other closed forms are listed up to
-    LISTED nodes.
-    """
+    """Compare claimed parts with the spectrum of a graph."""
+    # Chains, rings, grids, tori and Cartesian products of families need no list of eigenvalues: extreme eigenvalues are
+    # sums of extreme eigenvalues of the factors. Other closed forms are listed up to LISTED nodes.
     true_parts = _Parts(graph)
     problems, right = [], []
     for part in parts:
@@ -194,10 +191,8 @@ class _Parts:
 
 
 def _axes(graph: Topology) -> Iterator[Topology]:
-    """Yield the factors of a Cartesian product, without factors of one node.
-
-    A product is factored if both factors have a short spectrum without positive eigenvalues.
-    """
+    """Yield the factors of a Cartesian product, without factors of one node."""
+    # A product is factored if both factors have a short spectrum without positive eigenvalues.
     pair = factors(graph)
     if graph.name in ("grid", "torus") and (sides := family(graph.name).sides):
         shape = dict(graph.options).get("shape")

@@ -122,10 +122,8 @@ class ClosedForm:
         return self.lowest.get(symbol, self.least)
 
     def at(self, **numbers: int) -> list[tuple[sp.Expr, int]]:
-        """Return eigenvalues and multiplicities for numbers such as n=5 or p=3, q=4.
-
-        Equal eigenvalues are not merged.
-        """
+        """Return eigenvalues and multiplicities for numbers such as n=5 or p=3, q=4."""
+        # Equal eigenvalues are not merged.
         sizes = self.by_symbol(numbers)
         return [(value, count) for term in self.terms for value, count, _ in term.at(sizes)]
 

@@ -55,10 +55,8 @@ def union(first: ClosedForm, second: ClosedForm) -> ClosedForm:
 
 
 def box(part: ClosedForm, sizes: Sequence[sp.Expr], indices: Sequence[sp.Symbol]) -> ClosedForm:
-    """Return the closed-form spectrum of a Cartesian product of chains or rings (grid, torus).
-
-    `indices` are the indices of the eigenvalue in each direction.
-    """
+    """Return the closed-form spectrum of a Cartesian product of chains or rings (grid, torus)."""
+    # `indices` are the indices of the eigenvalue in each direction.
     (n,) = part.symbols
     ((old, _, _),) = part.terms[0].indices
     parts = [renamed(part, {n: size, old: k}) for size, k in zip(sizes, indices, strict=True)]

@@ -51,12 +51,8 @@ def one_degree(n: int, links: Iterable[Link]) -> Fraction | None:
 
 
 def join(n: int, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
-    """Return the class of each node in the finest partition with every pair in one class.
-
-    References
-    ----------
-    R. E. Tarjan, J. Assoc. Comput. Mach. 22, 215 (1975): union-find with path compression.
-    """
+    """Return the class of each node in the finest partition with every pair in one class."""
+    # R. E. Tarjan, J. Assoc. Comput. Mach. 22, 215 (1975): union-find with path compression.
     parent = list(range(n))
 
     def root(i: int) -> int:

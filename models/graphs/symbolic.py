@@ -61,10 +61,8 @@ class SymbolicTopology:
         return symbolic_spectrum(self.matrix, self.name)
 
     def at(self, **values: object) -> Topology:
-        """Substitute rational numbers for all symbols; links whose weights become 0 are left out.
-
-        Raises ValueError on a missing or unknown symbol, a number that is not rational and a division by zero.
-        """
+        """Substitute rational numbers for all symbols; links whose weights become 0 are left out."""
+        # Raises ValueError on a missing or unknown symbol, a number that is not rational and a division by zero.
         symbols = {str(symbol): symbol for symbol in self.symbols}
         if set(values) != set(symbols):
             raise ValueError(f"{self.name}: found values of {sorted(values)}; expected them of {sorted(symbols)}")

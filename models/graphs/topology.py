@@ -28,10 +28,9 @@ if TYPE_CHECKING:
 
 
 class Rule(Protocol):
-    """Protocol of the family or operation that made a graph: compute links, and facts that need no links.
+    """Protocol of the family or operation that made a graph: compute links, and facts that need no links."""
 
-    Equal rules make equal graphs.
-    """
+    # Equal rules make equal graphs.
 
     @property
     def link_count(self) -> int | None:

@@ -26,11 +26,9 @@ _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u206
 
 
 def short_repr(value: object) -> str:
-    """Return `repr` of any value on one line of at most 120 characters, for an error message.
-
-    If `repr` fails (a broken `__repr__`, an integer beyond Python's limit of digits), return the type of
-    the value, so that the error message still appears.
-    """
+    """Return `repr` of any value on one line of at most 120 characters, for an error message."""
+    # If `repr` fails (a broken `__repr__`, an integer beyond Python's limit of digits), return the type of the value,
+    # so that the error message still appears.
     short = reprlib.Repr()
     short.maxstring = short.maxother = 60
     short.maxlevel = 2
@@ -109,10 +107,8 @@ def check_text(what: str, value: object, limit: int = 200) -> str:
 
 
 def check_printable(what: str, value: str) -> str:
-    """Return the text; ValueError if it contains a control character.
-
-    A terminal executes control characters, and a name may come from any file.
-    """
+    """Return the text; ValueError if it contains a control character."""
+    # A terminal executes control characters, and a name may come from any file.
     control = _CONTROL.search(value)
     if control:
         raise ValueError(

@@ -94,10 +94,9 @@ B = TypeVar("B", bound=sp.Basic)
 
 @dataclass(frozen=True, slots=True)
 class Expressions(Algebra[sp.Basic]):
-    """Algebra of SymPy expressions; operands are checked before each operation, so that constants stay bounded.
+    """Algebra of SymPy expressions; operands are checked before each operation, so that constants stay bounded."""
 
-    A subclass defines the names and functions.
-    """
+    # A subclass defines the names and functions.
 
     what: str  # the subject of errors
     deepest = 100

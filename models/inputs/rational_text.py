@@ -132,10 +132,8 @@ def file_text(path: str | Path, what: str, expected: str = "a text file") -> tup
 
 
 def parse_rows(text: str, name: str) -> list[list[str]]:
-    """Split the text of a matrix into rows of entries, separated by blanks or commas.
-
-    Comments begin with `#`; empty lines are skipped.
-    """
+    """Split the text of a matrix into rows of entries, separated by blanks or commas."""
+    # Comments begin with `#`; empty lines are skipped.
     rows: list[list[str]] = []
     for number, line in enumerate(text.splitlines(), 1):
         bare = line.partition("#")[0].strip()

@@ -108,10 +108,8 @@ class Algebra(Generic[V]):
         return self.power(base, self.number(exponent))
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[Any] | None]:
-        """Return an algebra for each argument of a call, None for an argument passed on as text.
-
-        Raise NoMeaning for an unknown function or a wrong number of arguments.
-        """
+        """Return an algebra for each argument of a call, None for an argument passed on as text."""
+        # Raise NoMeaning for an unknown function or a wrong number of arguments.
         raise NoMeaning
 
     def call(self, function: str, arguments: Sequence[Any], options: Mapping[str, str]) -> V:

@@ -12,10 +12,8 @@ from pathlib import Path
 def open_regular(
     path: str | os.PathLike[str], *, writing: bool = False, flags: int = 0, folder: int | None = None
 ) -> FileIO:
-    """Open a regular file without buffering.
-
-    The kind of file is tested on the open descriptor, so that exchanging the file meanwhile has no effect.
-    """
+    """Open a regular file without buffering."""
+    # The kind of file is tested on the open descriptor, so that exchanging the file meanwhile has no effect.
     flags |= os.O_RDWR if writing else os.O_RDONLY
     flags |= getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
     file = Path(path)

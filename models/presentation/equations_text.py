@@ -82,11 +82,9 @@ def text(equations: Equations) -> str:
 
 
 def as_dict(equations: Equations) -> dict[str, object]:
-    """Return names, right-hand sides, derivatives and digest; expressions are text that SymPy reads.
-
-    `jacobian` holds the non-zero entries, with keys such as "v_1,x_1" (row, column).  Time is called t.
-    If links have inertia, `mass` holds the non-zero entries of M in M d(state)/dt = rhs, with the same keys.
-    """
+    """Return names, right-hand sides, derivatives and digest; expressions are text that SymPy reads."""
+    # `jacobian` holds the non-zero entries, with keys such as "v_1,x_1" (row, column). Time is called t. If links have
+    # inertia, `mass` holds the non-zero entries of M in M d(state)/dt = rhs, with the same keys.
     state = equations.state
     entries, mass = equations.jacobian().items(), equations.mass()
     return {
@@ -198,10 +196,8 @@ class _NamedNode:
 
 
 def _with_law(e: sp.Expr, law: sp.Expr, state: tuple[sp.Symbol, ...]) -> sp.Expr:
-    """Replace (factor) law(w) in an expression by (factor) f(w).
-
-    Try each sum with a state as w; take the first for which the replacement succeeds.
-    """
+    """Replace (factor) law(w) in an expression by (factor) f(w)."""
+    # Try each sum with a state as w; take the first for which the replacement succeeds.
     sums = sorted((s for s in e.atoms(sp.Add) if s != e and s.has(*state)), key=sp.default_sort_key)
     for w in sums:
         terms = sp.Add.make_args(e.xreplace({w: SLIDING}))
@@ -242,10 +238,8 @@ class _NetworkText:
             yield f"{self._left(writer, c, i)} = {writer.total(terms)}"
 
     def _left(self, writer: ExpressionWriter, c: int, i: int) -> str:
-        """Write the left side: the rate of component c of node i, plus masses of links times rates.
-
-        The rate of a velocity is written as a second derivative, chi''.
-        """
+        """Write the left side: the rate of component c of node i, plus masses of links times rates."""
+        # The rate of a velocity is written as a second derivative, chi''.
         equations, states = self.equations, self.equations.symbols(i)
         row = [e.xreplace(equations.at_node(i)) for e in _masses(equations.node_at(i), c)]
         left = _massive(row, states, writer) if row else writer.write(states[c]) + "'"
@@ -338,10 +332,8 @@ class _NetworkText:
     def _letters(
         self, named: _NamedNode, symbols: tuple[sp.Symbol, ...], index: str, i: int = 0
     ) -> dict[sp.Symbol, str]:
-        """Map the states of node i and the time to letters.
-
-        With a friction law these are chi and tau.  A velocity is its coordinate with a prime.
-        """
+        """Map the states of node i and the time to letters."""
+        # With a friction law these are chi and tau. A velocity is its coordinate with a prime.
         node, style = self.equations.node_at(i), self.style
         plain = named.law is None or {"chi", "tau"} & {s.name for s in (*node.state, *node.parameters)}
         speeds = {velocity: c for c, velocity in _pairs(self.equations, i).items()}
@@ -385,10 +377,8 @@ def _summed(term: sp.Expr, inside: tuple[sp.Symbol, ...], writer: ExpressionWrit
 
 
 def _pairs(equations: Equations, i: int = 0) -> dict[int, int]:
-    """Map each coordinate of node i to its velocity, by component numbers.
-
-    A state is a coordinate if its rate is exactly another state, and links add nothing to the rate.
-    """
+    """Map each coordinate of node i to its velocity, by component numbers."""
+    # A state is a coordinate if its rate is exactly another state, and links add nothing to the rate.
     node, kind = equations.node_at(i), equations.kind_of[i]
     edges = [edge for (target, _), edge in equations.edge_of if target == kind]
     velocity_of: dict[int, int] = {}

@@ -46,10 +46,8 @@ def characteristic(graph: Matrix) -> fmpq_poly:
 
 
 def sparse(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomial]) -> Polynomial | None:
-    """Return the characteristic polynomial of a chain, ring or forest; None for any other matrix.
-
-    `polynomial` makes a polynomial of integer coefficients, over the integers or modulo a prime.
-    """
+    """Return the characteristic polynomial of a chain, ring or forest; None for any other matrix."""
+    # `polynomial` makes a polynomial of integer coefficients, over the integers or modulo a prime.
     if banded(n, entries):
         return cyclic(n, entries, polynomial)
     return forest(n, entries, polynomial)
@@ -77,13 +75,10 @@ def cyclic(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomia
 
 
 def forest(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomial] = fmpz_poly) -> Polynomial | None:
-    """Return the characteristic polynomial of a matrix whose links form a forest, else None.
-
-    The arguments are those of `sparse`.  The polynomial of a branch whose root has the diagonal entry a
-    is (z - a) Π_k P_k - Σ_k b_k Q_k Π_(j != k) P_j.  Here k runs over the branches at the root, P_k is
-    the polynomial of branch k, Q_k the polynomial of branch k without the root of k, and b_k the
-    product of the two entries of the link to k.
-    """
+    """Return the characteristic polynomial of a matrix whose links form a forest, else None."""
+    # The arguments are those of `sparse`. The polynomial of a branch whose root has the diagonal entry a is (z - a) Π_k
+    # P_k - Σ_k b_k Q_k Π_(j != k) P_j. Here k runs over the branches at the root, P_k is the polynomial of branch k,
+    # Q_k the polynomial of branch k without the root of k, and b_k the product of the two entries of the link to k.
     order = _parents_first(n, entries)
     if order is None:
         return None

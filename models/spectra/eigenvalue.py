@@ -174,10 +174,8 @@ def distinct(claims: Sequence[Eigenvalue]) -> bool:
 
 
 def ordered(claims: Sequence[Eigenvalue]) -> tuple[Eigenvalue, ...]:
-    """Sort eigenvalues by decreasing real part, conjugates side by side.
-
-    Where floats are too close to decide, compare certified balls.
-    """
+    """Sort eigenvalues by decreasing real part, conjugates side by side."""
+    # Where floats are too close to decide, compare certified balls.
     if any(isinstance(e.value, complex) for e in claims):
         return tuple(sorted(claims, key=cmp_to_key(_complex_order)))
     if len({e.value for e in claims}) == len(claims):

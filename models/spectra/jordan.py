@@ -70,10 +70,8 @@ def value_at(graph: Matrix, polynomial: fmpq_poly) -> fmpz_mat:
 
 
 def geometric_multiplicity(graph: Matrix, eigenvalue: Eigenvalue) -> int:
-    """Return the number of independent eigenvectors of an eigenvalue of a graph, by an exact rank.
-
-    The number is the nullity of p(G) divided by the degree of p, the minimal polynomial of the eigenvalue.
-    """
+    """Return the number of independent eigenvectors of an eigenvalue of a graph, by an exact rank."""
+    # The number is the nullity of p(G) divided by the degree of p, the minimal polynomial of the eigenvalue.
     if eigenvalue.multiplicity == 1 or graph.diagonalisable:
         return eigenvalue.multiplicity
     p = minimal_polynomial(eigenvalue.number)

@@ -33,11 +33,9 @@ Powers = tuple[Fraction, tuple[tuple[Fraction, Fraction], ...]]
 
 
 def check_modulo(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]]) -> float | None:
-    """Compare a closed form with the characteristic polynomial modulo PRIMES primes.
-
-    Return the probability of missing a difference; None if a number is no sum of roots of unity.  A hash
-    of the closed form selects the primes.
-    """
+    """Compare a closed form with the characteristic polynomial modulo PRIMES primes."""
+    # Return the probability of missing a difference; None if a number is no sum of roots of unity. A hash of the closed
+    # form selects the primes.
     all_powers = [(_powers(sp.sympify(number)), times) for number, times in pairs]
     claims = [(powers, times) for powers, times in all_powers if powers is not None]
     if len(claims) != len(all_powers):
@@ -76,10 +74,8 @@ def _powers(number: sp.Expr) -> Powers | None:
 
 
 def _surd(number: sp.Expr) -> Powers | None:
-    """Expand a + b √c with c = 1 mod 4 by the Gauss sum √c = Σ_k exp(2πik²/c); None for any other number.
-
-    See Washington 1997, chapter 6.
-    """
+    """Expand a + b √c with c = 1 mod 4 by the Gauss sum √c = Σ_k exp(2πik²/c); None for any other number."""
+    # See Washington 1997, chapter 6.
     a, scaled_root = number.as_coeff_Add()
     b, root = scaled_root.as_coeff_Mul()
     if not (a.is_Rational and b.is_Rational and root.is_Pow and root.exp == sp.S.Half and root.base.is_Integer):

@@ -24,21 +24,16 @@ class WeightedGraph(Matrix, Protocol):
 
 
 def spanning_trees(graph: WeightedGraph) -> Fraction:
-    """Return the sum over all spanning trees of the products of their weights, by the matrix-tree theorem.
-
-    If all weights are 1, the sum is the number of spanning trees.  The sum is 0 if the graph is not
-    connected.
-    """
+    """Return the sum over all spanning trees of the products of their weights, by the matrix-tree theorem."""
+    # If all weights are 1, the sum is the number of spanning trees. The sum is 0 if the graph is not connected.
     first, _ = _lowest(graph, "spanning trees")
     return first / graph.n
 
 
 def kirchhoff_index(graph: WeightedGraph) -> Fraction:
-    """Return the sum of the resistances between all pairs of nodes, with weights as conductances.
-
-    The sum equals n Σ 1/μ over the nonzero eigenvalues μ of -G (D. J. Klein, M. Randić, J. Math. Chem.
-    12, 81, 1993; I. Gutman, B. Mohar, J. Chem. Inf. Comput. Sci. 36, 982, 1996).
-    """
+    """Return the sum of the resistances between all pairs of nodes, with weights as conductances."""
+    # The sum equals n Σ 1/μ over the nonzero eigenvalues μ of -G (D. J. Klein, M. Randić, J. Math. Chem. 12, 81, 1993;
+    # I. Gutman, B. Mohar, J. Chem. Inf. Comput. Sci. 36, 982, 1996).
     first, second = _lowest(graph, "Kirchhoff index")
     if not first:
         raise ValueError(

@@ -158,10 +158,8 @@ def _check_axis(model: Model, parameters: Mapping[str, float], axis: Axis) -> No
 def rest_in_sweep(
     frequency: sp.Expr, parameters: Mapping[str, float], axes: Sequence[Axis], zipped: bool
 ) -> tuple[str, float] | None:
-    """Return the name of an axis and the first value at which the frequency is 0; None if there is no such value.
-
-    A grid in which several axes change the frequency is not searched.
-    """
+    """Return the name of an axis and the first value at which the frequency is 0; None if there is no such value."""
+    # A grid in which several axes change the frequency is not searched.
     names = names_in(frequency)
     moving = {axis.name: axis.values for axis in axes if axis.name in names}
     if not moving or (len(moving) > 1 and not zipped):

@@ -35,19 +35,16 @@ class Graphs:
 
     @property
     def union(self) -> Topology:
-        """The union of the graphs.
-
-        A run integrates all links of the union.  Each cell sets the weights; a weight 0 means no link.
-        """
+        """The union of the graphs."""
+        # A run integrates all links of the union. Each cell sets the weights; a weight 0 means no link.
         return union_of(self.graphs, f"union of {len(self.graphs)} graphs")
 
 
 @dataclass(frozen=True, slots=True)
 class RandomGraph:
-    """A random graph that is drawn anew for each realisation, as text such as "erdos_renyi(20, p=0.3)".
+    """A random graph that is drawn anew for each realisation, as text such as "erdos_renyi(20, p=0.3)"."""
 
-    `read_graph` defines the grammar of the text; seeds are left out.
-    """
+    # `read_graph` defines the grammar of the text; seeds are left out.
 
     text: str
 
@@ -192,12 +189,10 @@ def _is_row(value: object) -> TypeGuard[Sequence[object]]:
 
 @lru_cache(maxsize=64)
 def drawn_axes(model: Model, drawn: FrozenDict[Draws], count: int, rng: int) -> tuple[Axis, ...]:
-    """Return the drawn values of each parameter and initial state, one for each realisation.
-
-    A parameter or state of nodes is drawn for each node separately.  A parameter of links, and the weights "W", are
-    drawn for each edge separately: the links i -> j and j -> i have one number.  The random stream of a name depends
-    only on `rng` and the name, not on the number of workers or on other draws.
-    """
+    """Return the drawn values of each parameter and initial state, one for each realisation."""
+    # A parameter or state of nodes is drawn for each node separately. A parameter of links, and the weights "W", are
+    # drawn for each edge separately: the links i -> j and j -> i have one number. The random stream of a name depends
+    # only on `rng` and the name, not on the number of workers or on other draws.
     axes: dict[str, Axis] = {}
     for name, how in drawn.items():
         for single, values in _columns(model, name, how, count, rng):

@@ -15,14 +15,12 @@ SEED_LIMIT = 2**63 - 1  # largest seed: the largest signed integer of 64 bits, w
 def default_start(
     components: tuple[str, ...], n: int, centre: Mapping[Any, float] | None = None
 ) -> dict[str, tuple[float, ...]]:
-    """Return the default initial states: the first component differs between oscillators, the others are 0.
-
-    Up to four oscillators start at 0.30, 0.28, 0.26, 0.24.  The first two values are from the source paper (Marszal et
-    al., Eur. Phys. J. Special Topics, 2016); the others continue the sequence.  More oscillators are spread evenly over
-    0.30 … 0.24, so that the initial spread does not grow with the network.  Around a `centre` the same distances are
-    parts of its first component, or of its largest one if the first is 0.  Raises ValueError if `centre` has an unknown
-    component.
-    """
+    """Return the default initial states: the first component differs between oscillators, the others are 0."""
+    # Up to four oscillators start at 0.30, 0.28, 0.26, 0.24. The first two values are from the source paper (Marszal et
+    # al., Eur. Phys. J. Special Topics, 2016); the others continue the sequence. More oscillators are spread evenly
+    # over 0.30 … 0.24, so that the initial spread does not grow with the network. Around a `centre` the same distances
+    # are parts of its first component, or of its largest one if the first is 0. Raises ValueError if `centre` has an
+    # unknown component.
     if centre is None:
         if n <= 4:
             first = tuple((30 - 2 * i) / 100 for i in range(n))

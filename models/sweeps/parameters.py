@@ -22,11 +22,9 @@ Place: TypeAlias = NodeName | LinkName  # the name of a parameter at one node or
 
 
 def parameters(model: Model, table: object, axes: Sequence[Axis]) -> FrozenDict[float]:
-    """Return every parameter with its value.
-
-    A parameter that differs from node to node, or is swept at a single node, is returned as a_1 … a_n.  A parameter
-    that differs from link to link, or is swept at a single link, is returned as k_1_2 … (the link from node 2 to 1).
-    """
+    """Return every parameter with its value."""
+    # A parameter that differs from node to node, or is swept at a single node, is returned as a_1 … a_n. A parameter
+    # that differs from link to link, or is swept at a single link, is returned as k_1_2 … (the link from node 2 to 1).
     read = _Table(model)
     for name, value in check_table("parameters", {} if table is None else table).items():
         if not isinstance(name, str):
@@ -103,10 +101,8 @@ def _listed(value: object) -> bool:
 
 
 def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:
-    """Return the values of a parameter of links from a list, a matrix, or the weights of a graph.
-
-    A list has the order of the links of the graph, or of the edges (i < j) if links run both ways.
-    """
+    """Return the values of a parameter of links from a list, a matrix, or the weights of a graph."""
+    # A list has the order of the links of the graph, or of the edges (i < j) if links run both ways.
     parameter, links = model.parameters[name], model.link_names(name)
     what = f"parameter {name!r}{model.on_graph(name)}"
     if is_graph(value):

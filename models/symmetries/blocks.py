@@ -110,10 +110,8 @@ class Generator:
 def irreducible_subspaces(
     matrices: Sequence[Generator], projectors: Sequence[fmpq_mat], size: int
 ) -> tuple[Subspace, ...]:
-    """Return the irreducible subspaces of dimension `size` under matrices and self-adjoint projectors.
-
-    Equivalent subspaces are returned once.  Raises ProofError if the dimensions do not add up.
-    """
+    """Return the irreducible subspaces of dimension `size` under matrices and self-adjoint projectors."""
+    # Equivalent subspaces are returned once. Raises ProofError if the dimensions do not add up.
     generators = [*matrices, *(Generator(p, p) for p in projectors)]
     subspaces = []
     for basis in _isotypic(generators, size):
@@ -146,10 +144,8 @@ def _isotypic(generators: Sequence[Generator], size: int) -> list[fmpq_mat]:
 def _irreducible(
     generators: Sequence[Generator], count: int, hull: tuple[tuple[Fraction, ...], ...], columns: Sequence[int]
 ) -> Iterator[Subspace]:
-    """Yield the irreducible subspaces of a sum of equivalent and conjugate ones: one of each kind.
-
-    `count`: number of generators whose matrices are returned.  `columns`: pivots of the hull.
-    """
+    """Yield the irreducible subspaces of a sum of equivalent and conjugate ones: one of each kind."""
+    # `count`: number of generators whose matrices are returned. `columns`: pivots of the hull.
     size = len(hull)
     # The best eigenvector has the eigenvalue of least multiplicity, which then counts the equivalent subspaces, and of
     # least degree, which makes short numbers.
@@ -310,10 +306,8 @@ class _NumberField:
         return len(matrix) - len(rows)
 
     def conjugate_roots(self, generic: list[list[Polynomial]], count: int) -> list[RealRoot | None]:
-        """Return one root θ for each of `count` subspaces that are not equivalent; None for a rational field.
-
-        `generic`: a generic element in the coordinates of the subspace.
-        """
+        """Return one root θ for each of `count` subspaces that are not equivalent; None for a rational field."""
+        # `generic`: a generic element in the coordinates of the subspace.
         if self.degree == 1:
             return [None]
         coefficients = [int(c) for c in self.polynomial.numer().coeffs()]

@@ -33,18 +33,11 @@ def class_links(n: int, links: Iterable[Link], classes: Sequence[int]) -> tuple[
 
 
 def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]) -> tuple[int, ...]:
-    """Return the class of each node in the coarsest balanced partition whose classes have one colour each.
-
-    Notes
-    -----
-    The algorithm is colour refinement of G, the links with the diagonal that makes row sums zero: a
-    partition is equitable for G exactly if it is balanced.  m links take O(m log n) additions of
-    integers, because after a split the largest part is not processed again.
-
-    References
-    ----------
-    J. E. Hopcroft, in: Theory of Machines and Computations (Academic Press, 1971), p. 189.
-    """
+    """Return the class of each node in the coarsest balanced partition whose classes have one colour each."""
+    # The algorithm is colour refinement of G, the links with the diagonal that makes row sums zero: a partition is
+    # equitable for G exactly if it is balanced. m links take O(m log n) additions of integers, because after a split
+    # the largest part is not processed again. J. E. Hopcroft, in: Theory of Machines and Computations (Academic Press,
+    # 1971), p. 189.
     if len(colours) != n:
         raise ValueError(f"colours: found {len(colours)} for {n} nodes; expected one for each node")
 

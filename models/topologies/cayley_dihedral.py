@@ -52,11 +52,9 @@ def count(n: int, *, rotations: tuple[int, ...] = (1,), reflections: tuple[int, 
 
 
 def spectrum(n: int, *, rotations: tuple[int, ...] = (1,), reflections: tuple[int, ...] = (0,)) -> Eigenvalues:
-    """Return Σ_a -4 sin²(πka/m) - r ± |Σ_b exp(2πikb/m)| over rotations a and the r reflections b, m = n/2.
-
-    The term of a half turn a = m/2 counts half.  For two reflections the modulus is a cosine; for more
-    than two return None.
-    """
+    """Return Σ_a -4 sin²(πka/m) - r ± |Σ_b exp(2πikb/m)| over rotations a and the r reflections b, m = n/2."""
+    # The term of a half turn a = m/2 counts half. For two reflections the modulus is a cosine; for more than two return
+    # None.
     from ..algebra.cosine_sums import AngleSum, expressions
 
     if len(reflections) > 2:

@@ -34,10 +34,8 @@ def settle(n: int) -> dict[str, object]:
 
 
 def _squares(p: int, e: int) -> set[tuple[int, ...]]:
-    """Return the non-zero squares of the field of p**e elements as coefficients, the constant first.
-
-    Elements are polynomials over the integers mod p, reduced by the first irreducible polynomial of degree e.
-    """
+    """Return the non-zero squares of the field of p**e elements as coefficients, the constant first."""
+    # Elements are polynomials over the integers mod p, reduced by the first irreducible polynomial of degree e.
     from flint import nmod_poly
 
     monic = (nmod_poly([*reversed(low), 1], p) for low in product(range(p), repeat=e))

@@ -21,10 +21,8 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
 
 
 def _pairs(n: int) -> list[tuple[int, int]]:
-    """Draw a perfect matching of the nodes (all but one if n is odd) without edges of the ring.
-
-    While a pair consists of neighbours in the ring, swap its second node with that of a random pair.
-    """
+    """Draw a perfect matching of the nodes (all but one if n is odd) without edges of the ring."""
+    # While a pair consists of neighbours in the ring, swap its second node with that of a random pair.
     stream = random.Random(_SEED)
 
     def below(count: int) -> int:

@@ -23,10 +23,8 @@ def settle(n: int, degree: object, seed: object) -> dict[str, object]:
 
 
 def edges(n: int, *, degree: int = 4, seed: int = 0) -> Iterator[tuple[int, int, int]]:
-    """Pair free ends of edges at random; start again if the remaining ends cannot be paired.
-
-    For a degree above n/2 draw the complement, whose degree is smaller.
-    """
+    """Pair free ends of edges at random; start again if the remaining ends cannot be paired."""
+    # For a degree above n/2 draw the complement, whose degree is smaller.
     stream = random.Random(seed)
     dense = 2 * degree > n
     drawn = _drawn(n, n - 1 - degree if dense else degree, stream)

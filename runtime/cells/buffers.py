@@ -40,10 +40,8 @@ class Buffers:
     def empty(
         cls, cells: int, dimension: int, room: int, samples: int, observed: int = 0, point_size: int | None = None
     ) -> Buffers:
-        """Return buffers of cells that have not run, filled with NaN and counts of 0.
-
-        `point_size`: numbers of a section point; by default the dimension.
-        """
+        """Return buffers of cells that have not run, filled with NaN and counts of 0."""
+        # `point_size`: numbers of a section point; by default the dimension.
         point_size = dimension if point_size is None else point_size
         return cls(
             end=np.full((cells, dimension), np.nan),

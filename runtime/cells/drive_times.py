@@ -28,13 +28,11 @@ def periods(equations: Equations, parameters: np.ndarray) -> np.ndarray:
 
 
 def longest_steps(equations: Equations, parameters: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return the longest step (cells,) at parameters (cells, parameters) of runs up to the times `end` (cells,).
-
-    A longer step could miss a swing or a pulse of the drive. For sines and cosines of time, the limit is half the
-    period of the fastest. For another function of time, the limit is the shortest time between two zeros, jumps, kinks
-    (`Drive.gaps`) or rises (`Drive.rises`). Without a drive the limit is inf. A drive without a period is sampled up to
-    `end`.
-    """
+    """Return the longest step (cells,) at parameters (cells, parameters) of runs up to the times `end` (cells,)."""
+    # A longer step could miss a swing or a pulse of the drive. For sines and cosines of time, the limit is half the
+    # period of the fastest. For another function of time, the limit is the shortest time between two zeros, jumps,
+    # kinks (`Drive.gaps`) or rises (`Drive.rises`). Without a drive the limit is inf. A drive without a period is
+    # sampled up to `end`.
     if not equations.forced or not len(parameters):
         return np.full(len(parameters), math.inf)
     values = by_place(equations, parameters)
@@ -49,11 +47,9 @@ def half_swing(equations: Equations, values: Mapping[str, np.ndarray], end: floa
 
 
 def by_place(equations: Equations, parameters: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the parameters of the drive by their names in templates, with a row for each cell and place.
-
-    Places are the nodes and the links. The value is NaN for a parameter that a place does not have.
-    Shapes: parameters (cells, parameters).
-    """
+    """Return the parameters of the drive by their names in templates, with a row for each cell and place."""
+    # Places are the nodes and the links. The value is NaN for a parameter that a place does not have. Shapes:
+    # parameters (cells, parameters).
     names = drive_parameters(equations)
     columns = dict(zip(equations.parameters, parameters.T, strict=True))
     at_nodes = {name: [f"{name}_{i + 1}" for i in range(equations.n)] for name in equations.varied}
@@ -120,14 +116,9 @@ def _shortest_stays(
     periods: np.ndarray,
     end: np.ndarray,
 ) -> np.ndarray:
-    """Return the shortest time (rows,) between two zeros of expressions of time; inf for fewer than two zeros.
-
-    Shapes: values (rows,), periods (rows,), end (rows,).
-
-    Notes
-    -----
-    Two zeros of one smooth expression are found at any distance; other zeros must be RESOLVED samples apart.
-    """
+    """Return the shortest time (rows,) between two zeros of expressions of time; inf for fewer than two zeros."""
+    # Shapes: values (rows,), periods (rows,), end (rows,). Two zeros of one smooth expression are found at any
+    # distance; other zeros must be RESOLVED samples apart.
     _, names = _written((*gaps, *rises))
     ends = np.where(periods > 0.0, 0.0, end)
     rows = np.column_stack([*(np.broadcast_to(values[name], periods.shape) for name in names), periods, ends])
@@ -155,10 +146,8 @@ def _shortest(gaps: tuple[sp.Expr, ...], rises: tuple[sp.Expr, ...], *row: float
 
 
 def _passages(values: np.ndarray, rises: bool) -> np.ndarray:
-    """Return the positions of changes of sign and their rise times (2, passages), in samples.
-
-    A jump has the rise time 0.
-    """
+    """Return the positions of changes of sign and their rise times (2, passages), in samples."""
+    # A jump has the rise time 0.
     nonzero = np.flatnonzero(values)
     old, new = values[nonzero[:-1]], values[nonzero[1:]]
     passed = old * new < 0.0
@@ -173,10 +162,8 @@ def _apart(passages: np.ndarray) -> np.ndarray:
 
 
 def _dips(values: np.ndarray) -> np.ndarray:
-    """Return the distances, in samples, between two zeros that lie between neighbouring samples of one sign.
-
-    A parabola through three samples detects such zeros.
-    """
+    """Return the distances, in samples, between two zeros that lie between neighbouring samples of one sign."""
+    # A parabola through three samples detects such zeros.
     before, here, after = values[:-2], values[1:-1], values[2:]
     slope, bend = 0.5 * (after - before), after - 2.0 * here + before
     bottom = here - 0.5 * slope * slope / bend

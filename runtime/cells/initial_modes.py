@@ -17,11 +17,9 @@ CLOCK = 8.0  # period of the clock of an oscillator without a drive: a power of 
 
 
 def with_modes(equations: Equations, start: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-    """Return initial states with the slip states that follow from velocities and loads at time 0.
-
-    An oscillator at exactly the ground's velocity sticks if static friction can hold it.
-    Shapes: start (cells, 3 n), parameters (cells, count).
-    """
+    """Return initial states with the slip states that follow from velocities and loads at time 0."""
+    # An oscillator at exactly the ground's velocity sticks if static friction can hold it. Shapes: start (cells, 3 n),
+    # parameters (cells, count).
     n = equations.n
     if not equations.sticks:
         return start
@@ -74,11 +72,10 @@ def _link_forces(
 
 
 def local_clock(equations: Equations, period: np.ndarray) -> np.ndarray:
-    """Return the period (cells,) of the clock of each cell; `period` (cells,): period of the drive, 0 without a drive.
-
-    Times of events are read from the clock, with its rounding error. If time does not enter the equations, the period
-    may have any length; a short one keeps the digits of events in long runs.
-    """
+    """Return the period (cells,) of the clock of each cell;"""
+    # `period` (cells,): period of the drive, 0 without a drive. Times of events are read from the clock, with its
+    # rounding error. If time does not enter the equations, the period may have any length; a short one keeps the digits
+    # of events in long runs.
     if not equations.sticks or any(e.has(TIME) for template in equations.templates for e in template.expressions):
         return period
     return np.full(len(period), CLOCK)

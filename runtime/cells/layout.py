@@ -17,12 +17,11 @@ LONGEST = 1e7
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Blocks of `size` cells, in C order over the axes.
+    """Blocks of `size` cells, in C order over the axes."""
 
-    In a continued sweep, a block is one column of up to `size` rows: cells of one value of the last axis. Each block
-    depends on the block of the value before. `columns`: number of values of the last axis; 0 if the sweep is not
-    continued. `falling`: True if the values are run in falling order.
-    """
+    # In a continued sweep, a block is one column of up to `size` rows: cells of one value of the last axis. Each block
+    # depends on the block of the value before. `columns`: number of values of the last axis; 0 if the sweep is not
+    # continued. `falling`: True if the values are run in falling order.
 
     cells: int
     size: int
@@ -43,11 +42,9 @@ class Layout:
         return math.ceil(self.cells / steps / self.size) * steps
 
     def part(self, part: tuple[int, int] | None) -> np.ndarray:
-        """Return whether each block (blocks,) belongs to part (k, N) of the sweep; all blocks belong to part None.
-
-        The blocks are dealt to the parts in turn, so that all parts share a costly region of a map. The columns of a
-        continued sweep depend on one another, and stay in one part.
-        """
+        """Return whether each block (blocks,) belongs to part (k, N) of the sweep; all blocks belong to part None."""
+        # The blocks are dealt to the parts in turn, so that all parts share a costly region of a map. The columns of a
+        # continued sweep depend on one another, and stay in one part.
         chains = np.arange(self.blocks) // max(self.columns, 1)
         if part is None:
             return np.ones(self.blocks, dtype=bool)
@@ -80,10 +77,8 @@ class Layout:
 
 
 def block_size(scene: Scene, width: int, workers: int, cells: int | None = None) -> int:
-    """Return the number of cells of a block, a multiple of the number of lanes.
-
-    A block keeps all lanes busy, but is small enough to be lost when a run is interrupted.
-    """
+    """Return the number of cells of a block, a multiple of the number of lanes."""
+    # A block keeps all lanes busy, but is small enough to be lost when a run is interrupted.
     if cells is None:
         cells = scene.cells // (scene.shape[-1] if scene.continued else 1)
     lengths = scene.transient + scene.window

@@ -21,10 +21,8 @@ from synchain.models.scenes.scene import Scene, Section
 
 
 def watched(scene: Scene) -> Recording:
-    """Return the observables, sections and stop of a scene's kernel.
-
-    The energy is replaced by sums over nodes and links.
-    """
+    """Return the observables, sections and stop of a scene's kernel."""
+    # The energy is replaced by sums over nodes and links.
     sections = Sections(scene)
     recording = Recording(
         records=(),
@@ -233,10 +231,8 @@ def _kept(section: Section) -> tuple[str, ...]:
 
 
 def over_window(window: ObservedWindow, tallies: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """Return a reduction (cells, rows) over a window from tallies (cells, rows, len(Tally)).
-
-    NaN for undefined values.
-    """
+    """Return a reduction (cells, rows) over a window from tallies (cells, rows, len(Tally))."""
+    # NaN for undefined values.
     gap = tallies[:, :, Tally.SUM] / length
     defined = np.where(np.isfinite(gap), 0.0, np.nan)
     match window:

@@ -34,13 +34,12 @@ Column = int | np.ndarray
 
 
 class Paces(NamedTuple):
-    """Rates per unit of time in each cell (cells,).
+    """Rates per unit of time in each cell (cells,)."""
 
-    From the eigenvalues: `fastest` is the fastest decay or growth, `turning` the fastest rotation, `growth` the fastest
-    growth, `parted` the fastest decay that is far faster than the slowest motion of its node; `size` bounds all
-    eigenvalues. `going` is the relative change of the rates along the motion, 0 at rest. `fastest` is inf if a rate is
-    finite but has an infinite slope.
-    """
+    # From the eigenvalues: `fastest` is the fastest decay or growth, `turning` the fastest rotation, `growth` the
+    # fastest growth, `parted` the fastest decay that is far faster than the slowest motion of its node; `size` bounds
+    # all eigenvalues. `going` is the relative change of the rates along the motion, 0 at rest. `fastest` is inf if a
+    # rate is finite but has an infinite slope.
 
     fastest: np.ndarray
     turning: np.ndarray
@@ -103,11 +102,9 @@ class Templates:
         shortest: np.ndarray,
         noise: np.ndarray | None,
     ) -> Paces:
-        """Return how fast the cells of some rows move.
-
-        Shapes: state (cells, dimension), parameters (cells, count), time (cells,), shortest (cells,), noise (cells,
-        dimension).
-        """
+        """Return how fast the cells of some rows move."""
+        # Shapes: state (cells, dimension), parameters (cells, count), time (cells,), shortest (cells,), noise (cells,
+        # dimension).
         if len(state) > BLOCK:
             each = [
                 self.paces(state[k], parameters[k], time[k], shortest[k], None if noise is None else noise[k])
@@ -159,10 +156,8 @@ class Templates:
         return rates
 
     def blocks(self, state: np.ndarray, parameters: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """Return the diagonal blocks (cells, nodes, p, p) of the Jacobian.
-
-        Terms of links count twice, a bound for springs.
-        """
+        """Return the diagonal blocks (cells, nodes, p, p) of the Jacobian."""
+        # Terms of links count twice, a bound for springs.
         blocks = np.zeros((len(state), self.nodes, self.size, self.size))
         for part in self.parts:
             size = part.states.shape[1]
@@ -313,10 +308,8 @@ def _turned(
 def _complex_steps(
     rates: Callable[..., list[float | np.ndarray]], size: int
 ) -> Callable[..., list[float | np.ndarray]]:
-    """Return the slopes of analytic rates, row by row, from steps along the imaginary axis.
-
-    Symbolic derivatives of large nodes would take seconds. Source: W. Squire, G. Trapp, SIAM Review 40, 110 (1998).
-    """
+    """Return the slopes of analytic rates, row by row, from steps along the imaginary axis."""
+    # Symbolic derivatives of large nodes would take seconds. Source: W. Squire, G. Trapp, SIAM Review 40, 110 (1998).
 
     def slopes(*arguments: np.ndarray) -> list[float | np.ndarray]:
         shape = np.broadcast_shapes(*(np.shape(e) for e in arguments))

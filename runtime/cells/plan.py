@@ -46,18 +46,15 @@ class CellRows:
 
 
 def plan(scene: Scene, near: np.ndarray | None = None) -> CellRows:
-    """Return the rows of all cells of a scene, in C order over the axes (the last one fastest).
-
-    Shapes: near (cells,).
-    """
+    """Return the rows of all cells of a scene, in C order over the axes (the last one fastest)."""
+    # Shapes: near (cells,).
     return Planner(scene).rows(np.arange(scene.cells), near)
 
 
 class Planner:
-    """Lay out any cells of a scene, so that only some rows are in memory at once.
+    """Lay out any cells of a scene, so that only some rows are in memory at once."""
 
-    `starts` (cells, dimension): initial states that replace those of the scene; axes of initial states replace both.
-    """
+    # `starts` (cells, dimension): initial states that replace those of the scene; axes of initial states replace both.
 
     def __init__(self, scene: Scene, starts: np.ndarray | None = None) -> None:
         self.scene = scene
@@ -81,10 +78,8 @@ class Planner:
         return columns | {name: values[indices[-1]] for name, values in self.drawn.items()}
 
     def rows(self, cells: np.ndarray, near: np.ndarray | None = None) -> CellRows:
-        """Return the rows of these cells.
-
-        `near` (cells,) is the column `SpanColumn.NEAR` of their spans (default: 0).
-        """
+        """Return the rows of these cells."""
+        # `near` (cells,) is the column `SpanColumn.NEAR` of their spans (default: 0).
         columns = self.columns(cells)
         parameters = self._parameters(columns, len(cells))
         start = np.empty((len(cells), len(self.scene.y0)))
@@ -139,10 +134,8 @@ class Planner:
         return self.rows(self._extremes())
 
     def sample(self) -> CellRows:
-        """Return the rows of the extreme cells, and of other cells that are evenly spread over the sweep.
-
-        All rows together have about LOOKED_AT nodes; there are at least two other cells.
-        """
+        """Return the rows of the extreme cells, and of other cells that are evenly spread over the sweep."""
+        # All rows together have about LOOKED_AT nodes; there are at least two other cells.
         spread = np.linspace(0, math.prod(self.scene.shape) - 1, max(2, LOOKED_AT // self.equations.n))
         return self.rows(np.union1d(self._extremes(), spread.round().astype(int)))
 

@@ -123,10 +123,8 @@ class ReducedScene:
         return Sections(self.scene).width(self.dimension)
 
     def empty(self, cells: int, room: int, observed: int | None = None) -> Buffers:
-        """Return empty buffers for cells of the reduced network.
-
-        `observed`: number of tallies, by default of observables.
-        """
+        """Return empty buffers for cells of the reduced network."""
+        # `observed`: number of tallies, by default of observables.
         observed = self.observed.numbers if observed is None else observed
         return Buffers.empty(cells, self.dimension, room, self.samples, observed, self.point_size)
 
@@ -341,10 +339,8 @@ def _colours(scene: Scene) -> list[Hashable]:
 
 
 def explain(reduction: ReducedScene) -> str:
-    """Return a text that lists the parts of a scene that are left out and the reasons, and the parts that remain.
-
-    The text also lists the parts of a run that a cell may skip.
-    """
+    """Return a text that lists the parts of a scene that are left out and the reasons, and the parts that remain."""
+    # The text also lists the parts of a run that a cell may skip.
     scene, records = reduction.scene, reduction.recording.records
     # List terms and records that the scene does not have.
     absent = []

@@ -17,10 +17,8 @@ Values = dict[sp.Symbol, np.ndarray]
 
 
 def row_modes(equations: Equations, start: np.ndarray, parameters: np.ndarray, slack: float = 0.0) -> np.ndarray:
-    """Return initial states (cells, dimension) with the modes that follow from the other states at time 0.
-
-    Levels and speeds of at most `slack` are zero.
-    """
+    """Return initial states (cells, dimension) with the modes that follow from the other states at time 0."""
+    # Levels and speeds of at most `slack` are zero.
     states = np.array(start, dtype=float)
     values: Values = {
         sp.Symbol(p, real=True): c[:, None] for p, c in zip(equations.parameters, parameters.T, strict=True)

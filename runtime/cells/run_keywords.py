@@ -56,10 +56,8 @@ class Given:
         return {check_text("parameters", name): value for name, value in (*table.items(), *self.keywords.items())}
 
     def scene(self, scene: Scene, free: Collection[str] = (), /, **settings: object) -> Scene:
-        """Return a scene of a single cell with these parameters, and with the settings that the function needs.
-
-        `free`: names of parameters on which the function does not depend.
-        """
+        """Return a scene of a single cell with these parameters, and with the settings that the function needs."""
+        # `free`: names of parameters on which the function does not depend.
         self.expect_one_cell(scene, free, stops="stop" in settings)
         numbers = self.checked(scene)
         listed = next((name for name, value in numbers.items() if is_row(value)), None)
@@ -71,11 +69,9 @@ class Given:
         return with_numbers(scene, numbers, **{**ONE_CELL, **settings})
 
     def expect_one_cell(self, scene: Scene, free: Collection[str] = (), *, stops: bool = False) -> None:
-        """Raise ValueError for a scene with draws, or with axes that no parameter of the call fixes.
-
-        Axes of parameters that are `free`, on which the function does not depend, are accepted. A stop raises
-        ValueError too, unless the function `stops` there.
-        """
+        """Raise ValueError for a scene with draws, or with axes that no parameter of the call fixes."""
+        # Axes of parameters that are `free`, on which the function does not depend, are accepted. A stop raises
+        # ValueError too, unless the function `stops` there.
         swept = [axis.name for axis in check_scene(scene).axes if axis.name not in {*self.values, *free}]
         for what, names, remedy in (("axes", swept, "axes=()"), ("draws", scene.draws, "realisations=0, draws=None")):
             if names:
@@ -151,10 +147,8 @@ class Given:
 
 
 def chosen(scene: Scene, name: str, keyword: Any, default: Any) -> Any:
-    """Return a keyword; if None, the scene's value if it differs from the default of `Scene`.
-
-    Else the function's default.
-    """
+    """Return a keyword; if None, the scene's value if it differs from the default of `Scene`."""
+    # Else the function's default.
     if keyword is not None:
         return keyword
     value = getattr(check_scene(scene), name)

@@ -20,10 +20,9 @@ TURNING = (sp.atan, sp.tanh, sp.erf, sp.Abs)
 
 
 class FastestRates(NamedTuple):
-    """The fastest decay or growth at a state, the fastest turning, and the fastest growth.
+    """The fastest decay or growth at a state, the fastest turning, and the fastest growth."""
 
-    0 for rates without a value.
-    """
+    # 0 for rates without a value.
 
     fastest: float
     turning: float
@@ -51,11 +50,9 @@ def mode_rates(
 
 
 def eigenvalue_rates(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the fastest decay or growth, turning, growth and parted decay (cells,) of blocks (cells, count, p, p).
-
-    A decay is parted if it is SPREAD times as fast as the slowest motion of its block.  A block with an infinite entry
-    is infinitely fast; one with a NaN does not count.
-    """
+    """Return the fastest decay or growth, turning, growth and parted decay (cells,) of blocks (cells, count, p, p)."""
+    # A decay is parted if it is SPREAD times as fast as the slowest motion of its block. A block with an infinite entry
+    # is infinitely fast; one with a NaN does not count.
     endless = (np.isinf(blocks).any(axis=(2, 3)) & ~np.isnan(blocks).any(axis=(2, 3))).any(axis=1)
     blocks = np.where(np.isfinite(blocks).all(axis=(2, 3), keepdims=True), blocks, 0.0)
     if blocks.shape[-1] == 2:  # the quadratic formula, twenty times faster than LAPACK
@@ -79,10 +76,9 @@ def eigenvalue_rates(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nda
 
 @lru_cache(maxsize=64)
 def turns(rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...]) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
-    """Return, for each turning function, a state and the value of this state at which the argument is zero.
-
-    Powers of absolute values are left out: a root is steep at one point only, and so has no layer.
-    """
+    """Return, for each turning function, a state and the value of this state at which the argument is zero."""
+    # Powers of absolute values are left out: a root is steep at one point only, and so has no layer.
+    #
     # Leave out powers of absolute values, then collect the arguments of turning functions.
     roots = {
         p: sp.S.Zero

@@ -56,15 +56,14 @@ def method_names(scene: Scene) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Ladder:
-    """The integrators of some equations in the order in which cells try them.
+    """The integrators of some equations in the order in which cells try them."""
 
-    The order is: Taylor series where they exist, explicit stages, a Rosenbrock method. A cell that is stiff at its
-    start begins with the Rosenbrock method, any other cell with the first method. If many steps remain, a cell pauses
-    after 64, 256, 1024 … steps and may change its method. It changes to Rosenbrock steps if its steps are as short as
-    the time of its fastest decay although its motion is slow. It changes to explicit stages if its series steps are far
-    shorter than any time of its motion, or if they underflow because a series has no next term. Each decision depends
-    on the cell alone.
-    """
+    # The order is: Taylor series where they exist, explicit stages, a Rosenbrock method. A cell that is stiff at its
+    # start begins with the Rosenbrock method, any other cell with the first method. If many steps remain, a cell pauses
+    # after 64, 256, 1024 … steps and may change its method. It changes to Rosenbrock steps if its steps are as short as
+    # the time of its fastest decay although its motion is slow. It changes to explicit stages if its series steps are
+    # far shorter than any time of its motion, or if they underflow because a series has no next term. Each decision
+    # depends on the cell alone.
 
     scene: Scene  # its integrator and its tolerances
     equations: Equations  # the equations that are integrated
@@ -133,10 +132,8 @@ class Ladder:
         return self.methods[np.bincount(self.first(rows)).argmax()]
 
     def steps(self, rows: CellRows, first: np.ndarray) -> np.ndarray:
-        """Return spans (cells, len(SpanColumn)) with the first step and the first pause.
-
-        `first`: index of the method.
-        """
+        """Return spans (cells, len(SpanColumn)) with the first step and the first pause."""
+        # `first`: index of the method.
         last = len(self.methods) - 1
         if last == 0 and not self.methods[0].implicit:
             return rows.spans
@@ -148,10 +145,8 @@ class Ladder:
         return spans
 
     def further(self, rows: CellRows, buffers: Buffers, method: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-        """Return the next method (cells,) of cells that paused or have steps that underflow; -1 to end the cell.
-
-        Shapes: method (cells,), lengths (cells,), the mean steps since the last pause.
-        """
+        """Return the next method (cells,) of cells that paused or have steps that underflow; -1 to end the cell."""
+        # Shapes: method (cells,), lengths (cells,), the mean steps since the last pause.
         paused = buffers.status == Status.PAUSED
         series = np.array([m.series for m in self.methods])[method]
         implicit = np.array([m.implicit for m in self.methods])[method]
@@ -175,23 +170,19 @@ class Ladder:
         return next(iter(unpassed(self.equations)), None) is not None
 
     def sliding(self, rows: CellRows, buffers: Buffers, lengths: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """Return whether paused cells (cells,) slide along a jump that max_steps cannot finish.
-
-        The error across a jump makes explicit steps short and of similar length. `lengths` (cells,) is the mean length
-        since the last pause, `before` (cells,) the mean length before that pause. A slide may end soon, and so may take
-        1/SLIDE of max_steps.
-        """
+        """Return whether paused cells (cells,) slide along a jump that max_steps cannot finish."""
+        # The error across a jump makes explicit steps short and of similar length. `lengths` (cells,) is the mean
+        # length since the last pause, `before` (cells,) the mean length before that pause. A slide may end soon, and so
+        # may take 1/SLIDE of max_steps.
         left = rows.spans[:, SpanColumn.END] - buffers.sums[:, SumColumn.STOPPED_AT]
         steady = (lengths < 2.0 * before) & (before < 2.0 * lengths)
         hopeless = left > SLIDE * self.scene.max_steps * lengths
         return np.asarray(self.jumps & steady & hopeless & (SLIDE * buffers.steps > self.scene.max_steps))
 
     def tolerances(self, rows: CellRows) -> tuple[np.ndarray, np.ndarray]:
-        """Return (rtol, atol), each (cells,), of the integration.
-
-        A default atol shrinks for small motions (`scale_of_atol`). The size of a motion is the larger of the size of
-        its start, and the distance that the initial rates cover in the shortest time of the cell.
-        """
+        """Return (rtol, atol), each (cells,), of the integration."""
+        # A default atol shrinks for small motions (`scale_of_atol`). The size of a motion is the larger of the size of
+        # its start, and the distance that the initial rates cover in the shortest time of the cell.
         rtol, atol = tolerances(self.scene, self.equations, rows.numbers)
         if self.scene.given["atol"] is None:
             start = np.abs(rows.start[:, self.moving]).max(axis=1)
@@ -241,11 +232,9 @@ def first_steps(templates: Templates, rows: CellRows) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def _has_series(equations: Equations) -> bool:
-    """Return whether Taylor steps can pass all kinks and jumps of the equations, and compile fast enough.
-
-    No motion may slide along a jump, or pass a point without a series. Dense mass matrices are excluded too: their
-    recurrences take longer to compile than most runs.
-    """
+    """Return whether Taylor steps can pass all kinks and jumps of the equations, and compile fast enough."""
+    # No motion may slide along a jump, or pass a point without a series. Dense mass matrices are excluded too: their
+    # recurrences take longer to compile than most runs.
     return not equations.inertial and taylor_obstacle(equations) is None and not may_cross_singularity(equations)
 
 
@@ -263,12 +252,9 @@ def chosen_for_modes(
     strengths: np.ndarray,
     slow: float = 1.0,
 ) -> Integrator:
-    """Return the integrator of orbits with deviations along them: a Taylor or a Rosenbrock method.
-
-    Choose Taylor steps if all functions are analytic, and neither the orbit nor the strongest mode is stiff at the
-    start.
-    Shapes: state (cells, dimension), parameters (cells, count), strengths (number of strengths, modes).
-    """
+    """Return the integrator of orbits with deviations along them: a Taylor or a Rosenbrock method."""
+    # Choose Taylor steps if all functions are analytic, and neither the orbit nor the strongest mode is stiff at the
+    # start. Shapes: state (cells, dimension), parameters (cells, count), strengths (number of strengths, modes).
     if scene.integrator == "taylor":
         return _taylor(scene, variation.orbit)
     smooth = scene.integrator == "auto" and is_analytic(variation.orbit)
@@ -284,11 +270,9 @@ def _taylor(scene: Scene, equations: Equations, large: bool = False) -> Integrat
 def mode_stiffness(
     variation: Variation, state: np.ndarray, parameters: np.ndarray, strengths: np.ndarray, slow: float = 1.0
 ) -> float:
-    """Return the stiffness of modes: the ratio of decay or growth of deviations to their turning, or to `slow`.
-
-    The largest ratio along the first orbits counts, for strength zero and the extreme strengths. Parameters as for
-    `chosen_for_modes`.
-    """
+    """Return the stiffness of modes: the ratio of decay or growth of deviations to their turning, or to `slow`."""
+    # The largest ratio along the first orbits counts, for strength zero and the extreme strengths. Parameters as for
+    # `chosen_for_modes`.
     rates = mode_rates(variation, state, parameters, strengths)
     return max((at.fastest / max(slow, at.turning) for at in rates), default=0.0)
 
@@ -301,10 +285,8 @@ def warn_of_stiff_modes(
     step: float,
     slow: float = 1.0,
 ) -> bool:
-    """Warn if Taylor steps with deviations were short because modes are stiff; return True after a warning.
-
-    `step`: mean length of the steps. Other parameters as for `chosen_for_modes`.
-    """
+    """Warn if Taylor steps with deviations were short because modes are stiff; return True after a warning."""
+    # `step`: mean length of the steps. Other parameters as for `chosen_for_modes`.
     if step * STIFF * slow >= 1.0:
         return False
     for fastest, turning, _ in mode_rates(variation, state, parameters, strengths):

@@ -29,12 +29,11 @@ LARGEST_ROOM = 2**25  # largest initial buffer for the section points of a block
 
 @dataclass(slots=True)
 class LadderEngine:
-    """Integrate rows of a scene; an `Engine`.
+    """Integrate rows of a scene; an `Engine`."""
 
-    `kernel` belongs to the integrator with which most cells begin. The kernel of another integrator is loaded when the
-    first cell needs it. `room` is the number of section points of a cell that the buffers hold at first; by default two
-    per period, as far as memory allows.
-    """
+    # `kernel` belongs to the integrator with which most cells begin. The kernel of another integrator is loaded when
+    # the first cell needs it. `room` is the number of section points of a cell that the buffers hold at first; by
+    # default two per period, as far as memory allows.
 
     reduction: ReducedScene
     kernel: Kernel
@@ -165,11 +164,9 @@ def lane_size(equations: Equations) -> int:
 
 
 def hand_over(lanes: np.ndarray, cells: np.ndarray, length: np.ndarray, ladder: Ladder, method: np.ndarray) -> None:
-    """Prepare lanes to continue with another method from their present state.
-
-    The new method begins with the mean length of the last steps. It stops at the end of every period, unless it is a
-    series. The search for repetition starts again.
-    """
+    """Prepare lanes to continue with another method from their present state."""
+    # The new method begins with the mean length of the last steps. It stops at the end of every period, unless it is a
+    # series. The search for repetition starts again.
     lane = lanes[cells]
     time, until = lane[:, slot.TIME], lane[:, slot.UNTIL]
     # Step control: first step, memory of the controller, error of the last change.
@@ -193,10 +190,8 @@ def hand_over(lanes: np.ndarray, cells: np.ndarray, length: np.ndarray, ladder: 
 
 
 def first_room(scene: Scene, row: int) -> int:
-    """Return the initial number of section points per cell: two per period, if memory allows.
-
-    `row`: numbers in a block for one more section point of every cell.
-    """
+    """Return the initial number of section points per cell: two per period, if memory allows."""
+    # `row`: numbers in a block for one more section point of every cell.
     if not {"section", "events"} & {*scene.record} and not scene.sections:
         return 0
     periods = scene.window if scene.time_unit == "period" else scene.window / math.pi

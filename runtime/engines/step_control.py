@@ -40,22 +40,18 @@ def control_of(planner: Planner, jumps: bool) -> np.ndarray:
 
 
 def first_step(growth: float) -> float:
-    """Return the first step of a Rosenbrock method, from the rate of growth of motions at the start.
-
-    A step much longer than the time of growth damps fast growth like fast decay, and damps the error estimate too: the
-    motion would stay at an unstable equilibrium. A short first step, after which the steps lengthen, resolves the
-    growth.
-    """
+    """Return the first step of a Rosenbrock method, from the rate of growth of motions at the start."""
+    # A step much longer than the time of growth damps fast growth like fast decay, and damps the error estimate too:
+    # the motion would stay at an unstable equilibrium. A short first step, after which the steps lengthen, resolves the
+    # growth.
     return min(FIRST_STEP, GROWN / max(growth, GROWN))
 
 
 def tolerances(scene: Scene, equations: Equations, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (rtol, atol), each (cells,), of the integration; `parameters` (cells, count) are those of the equations.
-
-    A smoothed jump of friction has the width 1/kappa in velocity; steps that do not resolve this width miss the jump.
-    With contact "atan", rtol is therefore at most 1/kappa and atol at most 0.1/kappa (not below 1e-13), for the largest
-    kappa of the nodes.
-    """
+    """Return (rtol, atol), each (cells,), of the integration;"""
+    # `parameters` (cells, count) are those of the equations. A smoothed jump of friction has the width 1/kappa in
+    # velocity; steps that do not resolve this width miss the jump. With contact "atan", rtol is therefore at most
+    # 1/kappa and atol at most 0.1/kappa (not below 1e-13), for the largest kappa of the nodes.
     rtol, atol = np.full(len(parameters), scene.rtol), np.full(len(parameters), scene.atol)
     columns = [k for k, name in enumerate(equations.parameters) if name.startswith("kappa")]
     if scene.contact != "atan" or not columns or not len(parameters):
@@ -77,10 +73,8 @@ def _names_of(scene: Scene, name: str) -> set[str]:
 
 
 def scale_of_atol(size: np.ndarray) -> np.ndarray:
-    """Return the factor of the default atol for motions of these sizes: a power of ten, at most 1.
-
-    The default atol is a tenth of rtol. For sizes below 0.1, the scaled atol is between 0.1 and 1 times rtol times the
-    size; it changes at 0.1, 0.01 and so on. Larger motions keep the default: for a motion of size 1e9, atol is
-    negligible beside rtol times the size, so that rtol alone controls the steps. A size of 0 means an unknown size.
-    """
+    """Return the factor of the default atol for motions of these sizes: a power of ten, at most 1."""
+    # The default atol is a tenth of rtol. For sizes below 0.1, the scaled atol is between 0.1 and 1 times rtol times
+    # the size; it changes at 0.1, 0.01 and so on. Larger motions keep the default: for a motion of size 1e9, atol is
+    # negligible beside rtol times the size, so that rtol alone controls the steps. A size of 0 means an unknown size.
     return np.asarray(10.0 ** np.floor(np.log10(np.where((size > 0.0) & (size < 0.1), 10.0 * size, 1.0))))

@@ -59,10 +59,8 @@ def warn_of_steps(ladder: Ladder, buffers: Buffers, rows_of: Callable[[np.ndarra
 
 
 def _warn_of_far_angles(ladder: Ladder, sizes: np.ndarray) -> None:
-    """Warn if the rounding error of an angle exceeds the tolerance.
-
-    `sizes` (cells, dimension): final sizes of states.
-    """
+    """Warn if the rounding error of an angle exceeds the tolerance."""
+    # `sizes` (cells, dimension): final sizes of states.
     allowed = np.where(np.isinf(ladder.longest), np.inf, ladder.scene.rtol * ladder.longest + ladder.scene.atol)
     shares = np.finfo(float).eps * sizes / allowed
     if shares.max(initial=0.0) <= 1.0:

@@ -9,10 +9,8 @@ from typing import Any
 
 
 def offer(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return `__getattr__` and `__dir__` of a module that offers the public names in `homes`.
-
-    `homes` maps a name to the module of `synchain` that defines it; a module of that name itself is written "".
-    """
+    """Return `__getattr__` and `__dir__` of a module that offers the public names in `homes`."""
+    # `homes` maps a name to the module of `synchain` that defines it; a module of that name itself is written "".
 
     def load(name: str) -> Any:
         if name not in homes:

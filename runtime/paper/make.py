@@ -30,11 +30,9 @@ def written(
     workers: int | None = None,
     show_progress: bool | None = None,
 ) -> Iterator[Path]:
-    """Compute and draw figures, by default all; yield the path of each file as soon as the file is complete.
-
-    The files of a figure are `<name>.png`, `<name>.svg`, `<name>.csv`, and for some figures `<name>_ranges.csv` or
-    `<name>.md`.
-    """
+    """Compute and draw figures, by default all; yield the path of each file as soon as the file is complete."""
+    # The files of a figure are `<name>.png`, `<name>.svg`, `<name>.csv`, and for some figures `<name>_ranges.csv` or
+    # `<name>.md`.
     figures = {name: load(name) for name in names or all_names()}
     folder = output_folder(out)
     runs = FigureRuns(QUICK if quick else FULL, workers=workers)

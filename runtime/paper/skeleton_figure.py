@@ -207,10 +207,8 @@ def _draw_diagram(axes: Axes, data: SkeletonFigure, size: float) -> None:
 
 
 def curves(branch: tuple[BranchPoint, ...]) -> list[tuple[bool, list[tuple[float, float]]]]:
-    """Cut a branch into curves of crossings, at each change of stability or of the number of crossings.
-
-    Each curve is a pair: True if stable, and its points (parameter, position).
-    """
+    """Cut a branch into curves of crossings, at each change of stability or of the number of crossings."""
+    # Each curve is a pair: True if stable, and its points (parameter, position).
     lines: list[tuple[bool, list[tuple[float, float]]]] = []
     crossings, last_stable = branch[0].x, None  # crossings of the last orbit, in the order of the curves
     for before, after in pairwise(branch):

@@ -27,10 +27,8 @@ def compute(name: str, runs: FigureRuns) -> Result:
 
 
 def synchronous(result: Result, tolerance: float = PAPER.tolerance) -> list[Interval]:
-    """Find the ranges of the first axis with an average error below a tolerance.
-
-    A range extends half a step of the axis beyond its first and its last value.
-    """
+    """Find the ranges of the first axis with an average error below a tolerance."""
+    # A range extends half a step of the axis beyond its first and its last value.
     x = result.data[result.scene.axes[0].name].values
     good = (result.status.values == Status.FINISHED) & (result.sync_error.values < tolerance)
     middles = 0.5 * (x[1:] + x[:-1])

@@ -68,10 +68,8 @@ def _graphs() -> list[Topology]:
 
 
 def largest_exponent(data: Map, graph: Topology) -> np.ndarray:
-    """Return the largest exponent of the modes of a network, as the median over the initial states.
-
-    Shapes: returns (omegas, sigmas).
-    """
+    """Return the largest exponent of the modes of a network, as the median over the initial states."""
+    # Shapes: returns (omegas, sigmas).
     strengths = [data.sigma * mode.size for mode in transversal_modes(graph)]
     # (omegas, starts, modes, sigmas)
     by_mode = [[[np.interp(x, data.alpha, row) for x in strengths] for row in starts] for starts in data.exponent]

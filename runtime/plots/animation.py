@@ -99,10 +99,9 @@ def animate(result: Result, seconds: float, fps: int) -> Animation:
 
 @dataclass(frozen=True, slots=True)
 class _Floor:
-    """What masses in a row move on: belts and walls, and the frames in which they are held or hit.
+    """What masses in a row move on: belts and walls, and the frames in which they are held or hit."""
 
-    Shapes: held, hit and each belt (n, frames).
-    """
+    # Shapes: held, hit and each belt (n, frames).
 
     belt: np.ndarray | None  # velocity under each mass; None without contacts
     walls: tuple[tuple[int, float, np.ndarray], ...]  # node, side (1: the mass is to the right), place in each frame

@@ -18,11 +18,9 @@ MARKED = 60  # most strengths that are marked with dots; more dots would hide th
 
 
 def draw_exponent(axes: Axes, function: MSF, sigma: float | None = None, **style: Any) -> Axes:
-    """Draw exponents over all computed strengths; dots mark the requested strengths if these are few.
-
-    A band shows two standard errors on either side, grey bands the ranges with a negative exponent. Orange dots
-    are the modes of the network at the strength `sigma` of links, by default that of the scene.
-    """
+    """Draw exponents over all computed strengths; dots mark the requested strengths if these are few."""
+    # A band shows two standard errors on either side, grey bands the ranges with a negative exponent. Orange dots are
+    # the modes of the network at the strength `sigma` of links, by default that of the scene.
     fine = function.fine
     value, error = finite(fine.exponent), finite(fine.stderr)
     bands(axes, function.intervals)

@@ -117,10 +117,8 @@ def _hits_node(positions: np.ndarray, i: int, j: int) -> bool:
 
 
 def draw_graph(value: HasDrawing, ax: Axes | None = None, values: ArrayLike | None = None, **style: Any) -> Axes:
-    """Draw a graph, or the graph of a scene, into axes (default: pyplot's); return the axes.
-
-    `values` (n,) colour the nodes: whole numbers as classes, others by a colour map.
-    """
+    """Draw a graph, or the graph of a scene, into axes (default: pyplot's); return the axes."""
+    # `values` (n,) colour the nodes: whole numbers as classes, others by a colour map.
     from matplotlib.collections import LineCollection
     from matplotlib.patches import FancyArrowPatch
 
@@ -206,10 +204,8 @@ def class_colours(classes: ArrayLike) -> list[str]:
 
 
 def svg(value: HasDrawing, width: int = 300) -> str:
-    """Return a graph as SVG text, or a sentence for more than SVG_NODES nodes or SVG_LINES lines.
-
-    Lines have the colour of the surrounding text, so that the drawing is readable on any background.
-    """
+    """Return a graph as SVG text, or a sentence for more than SVG_NODES nodes or SVG_LINES lines."""
+    # Lines have the colour of the surrounding text, so that the drawing is readable on any background.
     graph = graph_of(value)
     if graph.n > SVG_NODES or graph.link_count > 2 * SVG_LINES:
         return (

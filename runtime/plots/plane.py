@@ -59,10 +59,8 @@ def _colours(value: np.ndarray) -> tuple[str, TwoSlopeNorm]:
 
 
 def draw_rays(axes: Axes, plane: Plane, sigma: float | None = None) -> Axes:
-    """Draw the ray of every mode of the scene's network.
-
-    If the plane ends at beta = 0, only the mode with beta >= 0 of a conjugate pair is visible.
-    """
+    """Draw the ray of every mode of the scene's network."""
+    # If the plane ends at beta = 0, only the mode with beta >= 0 of a conjugate pair is visible.
     graph = plane.scene.topology
     still: dict[str, Any] = {"scalex": False, "scaley": False}
     for mode in transversal_modes(graph):

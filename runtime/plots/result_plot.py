@@ -37,11 +37,9 @@ PAINT: dict[str, Any] = {"shading": "nearest", "cmap": "cividis", "rasterized": 
 def draw_result(
     result: Result, ax: Axes | None = None, kind: str | None = None, windows: Iterable[Window] = (), **style: Any
 ) -> Axes:
-    """Draw a result, with shaded windows of the coupling strength behind it; pass `style` to Matplotlib's artists.
-
-    If the result has more axes than the plot, the leading axes are fixed at their first values; plots over time and of
-    the network show the first cell. Cells that did not finish are omitted, and a note above the plot counts them.
-    """
+    """Draw a result, with shaded windows of the coupling strength behind it; pass `style` to Matplotlib's artists."""
+    # If the result has more axes than the plot, the leading axes are fixed at their first values; plots over time and
+    # of the network show the first cell. Cells that did not finish are omitted, and a note above the plot counts them.
     if kind is not None and kind not in (choices := (*KINDS, *result.scene.observe)):
         raise ValueError(f"unknown kind of plot {kind!r}; known: {', '.join(choices)}{suggestion(kind, choices)}")
     possible, kinds = _possible(result)

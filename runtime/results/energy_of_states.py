@@ -44,12 +44,11 @@ class _Group:
 
 @dataclass(frozen=True, slots=True)
 class EnergyFunction:
-    """The energy of a scene's network for states (…, dimension) in the order of the equations.
+    """The energy of a scene's network for states (…, dimension) in the order of the equations."""
 
-    All numbers are non-dimensional.  One formula is applied to all nodes of a kind at once, and one to all links of a
-    kind, so that large networks and long trajectories cost only array operations.  `parameters` replace parameter
-    values of the scene.
-    """
+    # All numbers are non-dimensional. One formula is applied to all nodes of a kind at once, and one to all links of a
+    # kind, so that large networks and long trajectories cost only array operations. `parameters` replace parameter
+    # values of the scene.
 
     scene: Scene
     exact: EnergyTerms

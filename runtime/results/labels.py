@@ -128,10 +128,8 @@ class States:
         return cls(tuple(equations.components), equations.n, rows, columns, tuple(held))
 
     def table(self, values: np.ndarray) -> np.ndarray:
-        """Return states (…, states) as (…, components, nodes); NaN where a node lacks a component.
-
-        A state that a row holds at zero is 0, where integration left its rounding error.
-        """
+        """Return states (…, states) as (…, components, nodes); NaN where a node lacks a component."""
+        # A state that a row holds at zero is 0, where integration left its rounding error.
         values = np.array(values) if self.held else values
         for state, mode in self.held:
             values[values[..., mode] == 0.0, state] = 0.0
@@ -150,10 +148,8 @@ class States:
 def variables(
     scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: Certificate | None, most: int
 ) -> Iterator[Variable]:
-    """Yield the variables of some cells; `most` is the largest number of section points in any cell.
-
-    Shapes: spans (cells, len(SpanColumn)).
-    """
+    """Yield the variables of some cells; `most` is the largest number of section points in any cell."""
+    # Shapes: spans (cells, len(SpanColumn)).
     stopped = buffers.sums[:, SumColumn.STOPPED_AT]
     # How each cell was integrated.
     for name in ("status", "steps", "rejected", "periods_skipped"):

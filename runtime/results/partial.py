@@ -124,11 +124,9 @@ def read_partial(path: str | os.PathLike[str]) -> Result:
 
 
 def write_result(logs: Iterable[BlockLog], path: str | os.PathLike[str], scene: Scene, most: int) -> dict[str, int]:
-    """Write the result of logs that together contain each block once; return the number of cells by verdict.
-
-    One block is in memory at a time.  The first log contains block 0; a cell has at most `most` section points.  The
-    ending of `path` chooses the format of the file.
-    """
+    """Write the result of logs that together contain each block once; return the number of cells by verdict."""
+    # One block is in memory at a time. The first log contains block 0; a cell has at most `most` section points. The
+    # ending of `path` chooses the format of the file.
     following = iter(logs)
     first_log = next(following)
     reader = _BlockReader(first_log, scene, most)

@@ -45,11 +45,9 @@ def interval_text(
     grid_ends: Collection[float] = (),
     most: int = 8,
 ) -> str:
-    """Return intervals as "low … high; low … high" with the errors of their ends, or "none".
-
-    An end in `grid_ends` is followed by dots, since the interval may continue beyond the grid.  A lower end at 0 has no
-    dots, since couplings begin at 0.
-    """
+    """Return intervals as "low … high; low … high" with the errors of their ends, or "none"."""
+    # An end in `grid_ends` is followed by dots, since the interval may continue beyond the grid. A lower end at 0 has
+    # no dots, since couplings begin at 0.
 
     def end(value: float, error: float, lower: bool) -> str:
         cut = any(math.isclose(value, limit, rel_tol=1e-12) for limit in grid_ends) and not (lower and value == 0.0)

@@ -440,10 +440,8 @@ def _array(name: str, value: object) -> np.ndarray:
 
 
 def _swept(scene: Scene, names: tuple[str, ...]) -> Scene:
-    """Return the scene with two zipped cells, in which all values of the names differ.
-
-    Reductions then leave out nothing that depends on a value.
-    """
+    """Return the scene with two zipped cells, in which all values of the names differ."""
+    # Reductions then leave out nothing that depends on a value.
     if not names:
         return scene
     # An axis with any value shows the value of the scene: parameters of single nodes are listed only if one is swept.

@@ -58,11 +58,9 @@ def several(start: StartValue) -> TypeGuard[Result | xr.DataArray]:
 
 
 def starts_of_cells(scene: Scene, start: Result | xr.DataArray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the initial states (cells, dimension) of a scene's cells, and the times (axes) of the earlier run.
-
-    A cell starts from the cell with the same values of the axes. If `start` lacks an axis, all values of this axis
-    start from one cell. Raise ValueError as in `started`, and if an axis of `start` is unknown or has other values.
-    """
+    """Return the initial states (cells, dimension) of a scene's cells, and the times (axes) of the earlier run."""
+    # A cell starts from the cell with the same values of the axes. If `start` lacks an axis, all values of this axis
+    # start from one cell. Raise ValueError as in `started`, and if an axis of `start` is unknown or has other values.
     end, dims = start.end if isinstance(start, Result) else start, dimensions(scene)
     states = end.isel({name: 0 for name in end.dims if name in dims})
     _check_labels(scene, states)

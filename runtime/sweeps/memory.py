@@ -51,10 +51,8 @@ class Memory:
         return cls(prepared, prepared.layout(), reduction.merge.contract(network))
 
     def done(self) -> np.ndarray:
-        """Return whether each block (blocks,), and all blocks on which it depends, have finished.
-
-        In a continued sweep, clear the unfinished blocks.
-        """
+        """Return whether each block (blocks,), and all blocks on which it depends, have finished."""
+        # In a continued sweep, clear the unfinished blocks.
         finished = self.buffers.finished
         done = np.zeros(self.layout.blocks, dtype=bool)
         for block in range(self.layout.blocks):

@@ -56,10 +56,8 @@ class WorkerPool:
         self.close()
 
     def run(self, tasks: Iterator[Task], finish: Finish) -> None:
-        """Run the tasks, and the tasks that `finish` returns; raise the error of a worker.
-
-        On Ctrl-C, finish the blocks in flight first if possible; a second Ctrl-C abandons these blocks.
-        """
+        """Run the tasks, and the tasks that `finish` returns; raise the error of a worker."""
+        # On Ctrl-C, finish the blocks in flight first if possible; a second Ctrl-C abandons these blocks.
         arrived: SimpleQueue[Running] = SimpleQueue()
         flying: dict[Running, Task] = {}
 

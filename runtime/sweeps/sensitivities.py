@@ -95,10 +95,8 @@ class Sensitivity:
         return cls(window, (value, change), sections, rows)
 
     def derivative(self, length: np.ndarray, tallies: list[np.ndarray], points: list[np.ndarray]) -> np.ndarray:
-        """Return the derivative (runs, rows) of the observable.
-
-        Shapes: length (runs, 1), tallies (runs, rows, len(Tally)) each, points (runs, points, 2) of each section.
-        """
+        """Return the derivative (runs, rows) of the observable."""
+        # Shapes: length (runs, 1), tallies (runs, rows, len(Tally)) each, points (runs, points, 2) of each section.
         if self.window == ObservedWindow.VARIANCE:
             more, less = (over_window(self.window, part, length) for part in tallies)
             return np.asarray(0.5 * (more - less))
@@ -171,10 +169,9 @@ class Sensitivities:
     def of_rows(
         self, rows: CellRows, ran: np.ndarray
     ) -> tuple[dict[str, np.ndarray], dict[str, dict[str, np.ndarray]]]:
-        """Return the derivatives of states (cells, times, dimension) and of observables (cells, rows), by name.
-
-        `ran` (cells,): whether the cell finished without deviations. Raises ValueError if a derivative grows so fast that the states themselves have no digits.
-        """
+        """Return the derivatives of states (cells, times, dimension) and of observables (cells, rows), by name."""
+        # `ran` (cells,): whether the cell finished without deviations. Raises ValueError if a derivative grows so fast
+        # that the states themselves have no digits.
         lift, shape = self.lift, (len(rows), len(self.names))
         lifted_rows, scales = _lifted_rows(self.planner, lift, self.names, rows)
         buffers = self._run(lifted_rows)
@@ -225,10 +222,8 @@ class Sensitivities:
             yield name, np.where(buffers.finished[:, None], values, np.nan)
 
     def _check_growth(self, buffers: Buffers, samples: np.ndarray, ran: np.ndarray) -> None:
-        """Raise ValueError if a small relative change of a parameter grows exponentially beyond all digits.
-
-        Shapes: samples (cells, names, times, dimension), ran (cells,): whether the cell finished without deviations.
-        """
+        """Raise ValueError if a small relative change of a parameter grows exponentially beyond all digits."""
+        # Shapes: samples (cells, names, times, dimension), ran (cells,): whether the cell finished without deviations.
         shape, states, deviations = samples.shape[:2], list(self.lift.states), list(self.lift.deviations)
         end = buffers.end.reshape(*shape, -1)
         size = np.fmax(np.abs(end[:, :, states]).max(axis=-1), 1e-300)

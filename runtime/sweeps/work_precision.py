@@ -203,10 +203,8 @@ def _run(scene: Scene, integrator: str, rtol: float, repeats: int, execution: Ex
 
 
 def _error(result: Result, reference: Result) -> float:
-    """Return the largest difference of final states, in units of the largest magnitude of their component.
-
-    NaN if a cell ended early.
-    """
+    """Return the largest difference of final states, in units of the largest magnitude of their component."""
+    # NaN if a cell ended early.
     if not all(run.status.isin([Status.FINISHED, Status.STOPPED]).all() for run in (result, reference)):
         return np.nan
     others = [dim for dim in reference.end.dims if dim != "component"]
