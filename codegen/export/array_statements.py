@@ -112,5 +112,4 @@ def _block(k: int) -> Slice:
 
 
 def _joined(parts: Iterable[Expression]) -> Expression:
-    """Return the concatenation of arrays."""
     return call("np.concatenate", f"[{', '.join(map(NUMPY.text, parts))}]")

@@ -67,7 +67,6 @@ class ExportBody:
         return cls(tuple((s, e.xreplace(shown)) for s, e in steps), tuple(zip(table, values, strict=True)))
 
     def uses(self, symbols: Iterable[sp.Symbol]) -> list[sp.Symbol]:
-        """Return the symbols that occur in the temporaries or results."""
         used: set[sp.Symbol] = set().union(*(e.free_symbols for _, e in (*self.steps, *self.results)))
         return [s for s in symbols if s in used]
 
@@ -228,5 +227,4 @@ def array_tables(equations: Equations) -> list[str]:
 
 
 def weights(equations: Equations) -> list[str]:
-    """Return the weights of the links as decimals."""
     return [repr(number(weight).value) for _, _, weight in equations.links]

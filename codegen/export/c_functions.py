@@ -56,8 +56,6 @@ def in_c(source: str, constants: Iterable[str]) -> list[str]:
 
 
 class _Function:
-    """The text of one function."""
-
     def __init__(self, function: ast.FunctionDef, lines: list[str], whole: set[str], constants: Iterable[str]) -> None:
         self.function, self.lines, self.functions = function, lines, whole
         self.arguments = {a.arg: _annotation(a.annotation) for a in function.args.args}
@@ -70,7 +68,6 @@ class _Function:
         self.variables = dict.fromkeys(name for name, v in assigned if name not in self.arguments and not _is_array(v))
 
     def text(self) -> list[str]:
-        """Return the lines of the function."""
         f = self.function
         head = ", ".join(TYPES[kind].format(name) for name, kind in self.arguments.items())
         head = head.replace("double *numbers", "const double *numbers")
@@ -100,7 +97,6 @@ class _Function:
         return text
 
     def statement(self, s: ast.stmt) -> list[str]:
-        """Return the lines of one statement."""
         match s:
             case ast.Assign([ast.Name(name)], value) if _is_array(value):
                 assert isinstance(value, ast.Call)
@@ -136,7 +132,6 @@ class _Function:
         return [f"{head} {{", *(f"    {line}" for line in self.block(body)), "}"]
 
     def value(self, e: ast.expr) -> str:
-        """Return the text of an expression."""
         match e:
             case ast.Name(name):
                 return name

@@ -155,7 +155,6 @@ def _defaults(model: Equations, numbers: Mapping[str, float]) -> dict[str, str]:
 
 
 def _function(name: str, arguments: str, docstring: str, body: list[Statement]) -> list[str]:
-    """Return the lines of a function of time, state and parameters."""
     inner = [f'"""{docstring}"""', "state = np.asarray(state, dtype=float)", *NUMPY.lines(body)]
     return ["", f"def {name}(t, state{arguments}):", *(f"    {line}" for line in inner), ""]
 

@@ -83,8 +83,6 @@ class _Lower(lowering.Lower):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _Lowering(NativeLowering):
-    """Emit LLVM for a typed function."""
-
     _name = "writing"
     lowering_class = _Lower
 

@@ -348,12 +348,10 @@ class _TreeReader(ast.NodeVisitor):
     # -- conditions ------------------------------------------------------------------------------------------------
 
     def condition(self, node: ast.expr) -> TypedExpr:
-        """Read an expression as a truth value."""
         value: TypedExpr = self.visit(node)
         return value if value.type == types.boolean else self.call(bool, value)
 
     def conditional(self, condition: TypedExpr, yes: TypedExpr, no: TypedExpr) -> TypedExpr:
-        """Evaluate one of two expressions."""
         if yes.returns_new_reference or no.returns_new_reference:
             raise UnreadError
         result = self.common_type([yes, no])

@@ -78,7 +78,6 @@ class KernelSource(ABC):
 
     @property
     def integrator(self) -> str:
-        """The name of the integrator."""
         return self.method.name
 
     @property
@@ -108,7 +107,6 @@ def module(constants: Mapping[str, object], steps: Sequence[str], events: Sequen
 def describe(
     named: NamedEquations, method: Integrator, records: Sequence[str], operations: int, modes: str = ""
 ) -> str:
-    """Write the docstring of a kernel module."""
     equations, renamed = named.original, [f"{a} as {b}" for a, b in named.renamed]
     rows = [
         f"Generated kernel: {equations.n} oscillator{'s' * (equations.n > 1)}, {equations.link_count} links, {method.name}.",

@@ -282,7 +282,6 @@ def _shared(k: int) -> Load:
 
 
 def _mode_step(variation: Variation, parts: Parts, method: Integrator) -> list[Statement]:
-    """Write the step of one register of modes."""
     # load the step size, the strengths, the deviations and the constant coefficients
     size, strengths = variation.size, [s.name for s in variation.parameters]
     body: list[Statement] = [let(name, _shared(k)) for k, name in enumerate(("rate", "shift", "reach"))]
@@ -337,7 +336,6 @@ def _mode_stage(parts: Parts, method: Integrator, i: int, size: int) -> list[Sta
 
 
 def _largest(values: Sequence[Expression]) -> Expression:
-    """Return the largest absolute value."""
     first, *others = (call("absolute", e) for e in values)
     for other in others:
         first = call("maximum", first, other)

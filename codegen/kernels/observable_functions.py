@@ -230,7 +230,6 @@ class _LoopWriter:
         self.reduced: dict[sp.Expr, sp.Symbol] = {}  # reductions whose loops are written, and their results
 
     def statements(self, observed: Sequence[sp.Expr]) -> list[Statement]:
-        """Write all statements of a function."""
         # `AtNode` becomes a name of the network
         names = (*self.components, *self.varied)
         values = [

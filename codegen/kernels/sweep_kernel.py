@@ -60,8 +60,6 @@ MOST_OF_LINKS = 1000  # largest number of operations of all links in a written-o
 
 @dataclass(frozen=True, slots=True)
 class SweepKernel(KernelSource):
-    """A kernel that runs the cells of a sweep."""
-
     dimensions: Dimensions = field(repr=False)
     multiplicity: tuple[int, ...] = field(repr=False)  # number of oscillators that each node represents
     # points inside a step at which functions of the state are evaluated, with their weights (`rule_of`)

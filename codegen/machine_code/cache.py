@@ -208,7 +208,6 @@ _warned_folders: set[Path] = set()  # the folders for which a warning of refused
 
 
 def _warn_of_refusal(folder: Path, problem: str) -> None:
-    """Warn of a refused file, once for each folder."""
     if folder not in _warned_folders:
         _warned_folders.add(folder)
         warn(f"kernel cache {folder}: refused a file, whose kernel is compiled anew, as others may be: {problem}")

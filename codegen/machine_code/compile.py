@@ -68,8 +68,6 @@ class EntryPoint(Protocol):
 
 @dataclass(frozen=True, slots=True, weakref_slot=True)
 class Compiled:
-    """The compiled functions of one module."""
-
     functions: dict[str, Any]  # by name
     path: str  # file with the text; a name in the folder `<memory>` if the text is not on disk
     from_cache: bool  # True if the machine code was loaded from the cache, False if it was compiled
@@ -116,12 +114,10 @@ class Kernel:
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the text."""
         return self.origin.digest
 
     @property
     def equations(self) -> Equations:
-        """The equations that the kernel integrates."""
         return self.origin.equations
 
 

@@ -25,7 +25,6 @@ class Expression:
         return tuple(part for parts in listed for part in parts if isinstance(part, Expression))
 
     def walk(self) -> Iterator[Expression]:
-        """Yield the expression and all expressions below it."""
         yield self
         for part in self.parts:
             yield from part.walk()
@@ -61,8 +60,6 @@ class Number(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Name(Expression):
-    """A variable."""
-
     text: str
 
 
@@ -82,8 +79,6 @@ class ProductExpr(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Quotient(Expression):
-    """One value over another."""
-
     top: Expression
     bottom: Expression
 
@@ -98,8 +93,6 @@ class PowerExpr(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Negation(Expression):
-    """A value with its sign changed."""
-
     value: Expression
 
 
@@ -113,8 +106,6 @@ class Call(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Conditional(Expression):
-    """A choice between two values by a condition."""
-
     condition: Expression
     yes: Expression
     no: Expression
@@ -139,8 +130,6 @@ class Junction(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Not(Expression):
-    """The opposite of a condition."""
-
     condition: Expression
 
 
@@ -167,14 +156,12 @@ ZERO, ONE = Number(0.0), Number(1.0)
 
 
 def as_expression(value: Value) -> Expression:
-    """Return a number or the name of a variable as an expression."""
     if isinstance(value, Expression):
         return value
     return Name(value) if isinstance(value, str) else Number(value)
 
 
 def call(function: str, *arguments: Value) -> Call:
-    """Return the call of a function."""
     return Call(function, tuple(map(as_expression, arguments)))
 
 
@@ -184,7 +171,6 @@ def plus(first: Expression, *others: Expression) -> Expression:
 
 
 def product(factors: Sequence[Expression]) -> Expression:
-    """Return the product of the factors, one if there are none."""
     return ProductExpr(tuple(factors)) if len(factors) > 1 else factors[0] if factors else ONE
 
 

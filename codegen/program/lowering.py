@@ -43,12 +43,9 @@ class UnprintableError(ValueError):
 
 
 class Lowering:
-    """Translate expressions for lanes."""
-
     names: Mapping[str, str] = functions.LANES
 
     def __call__(self, e: sp.Expr) -> Expression:
-        """Return the expression as a tree."""
         if e.is_Symbol:
             return Name(e.name)
         if e.is_Float:
@@ -84,7 +81,6 @@ class Lowering:
         return Quotient(top, product([self(1 / f) for f in below])) if below else top
 
     def power(self, base: sp.Expr, exponent: sp.Expr) -> Expression:
-        """Return a power, by its exponent."""
         if base == sp.E:
             return call("exp", self(exponent))
         if exponent.is_number and exponent.is_negative:

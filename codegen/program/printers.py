@@ -111,7 +111,6 @@ class Printer:
         return self.condition(e), SUM
 
     def condition(self, e: Expression) -> str:
-        """Return the text of a condition."""
         match e:
             case Compare(sign, left, right):
                 return f"{self.text(left, TERM)} {sign} {self.text(right, TERM)}"
@@ -124,17 +123,14 @@ class Printer:
         raise TypeError(f"no text for {type(e).__name__}; this is a mistake in the program")
 
     def load(self, array: str, index: Expression, width: str | None) -> str:
-        """Return an element of an array."""
         return f"{array}[{self.text(index)}]"
 
     # -- statements -------------------------------------------------------------------------------------------
 
     def lines(self, statements: Iterable[Statement]) -> list[str]:
-        """Return the lines of some statements."""
         return [line for statement in statements for line in self.statement(statement)]
 
     def indented(self, statements: Iterable[Statement]) -> list[str]:
-        """Return the lines of some statements, indented."""
         return [f"    {line}" for line in self.lines(statements)]
 
     def block(self, head: str, body: Iterable[Statement]) -> list[str]:
@@ -142,7 +138,6 @@ class Printer:
         return [f"{head}:", *(self.indented(body) or ["    pass"])]
 
     def statement(self, s: Statement) -> list[str]:
-        """Return the lines of one statement."""
         match s:
             case Assign(targets, value, whole):
                 return [(self.whole if whole else self.assign).format(", ".join(targets), self.text(value))]
@@ -175,15 +170,12 @@ class Printer:
         return f"{array}[{', '.join(map(self.text, row_column))}]"
 
     def store(self, array: str, index: Index, value: Expression) -> str:
-        """Return an assignment to an element."""
         return f"{self.place(array, index)} = {self.text(value)}{self.end}"
 
     def accumulate(self, array: str, index: Index, value: Expression) -> str:
-        """Return an addition to an element."""
         return f"{self.place(array, index)} += {self.text(value)}{self.end}"
 
     def loop(self, index: str, start: Expression, stop: Expression, step: int) -> str:
-        """Return the head of a loop."""
         begin = "" if start == Number(0) and step == 1 else f"{self.text(start)}, "
         return f"for {index} in range({begin}{self.text(stop)}{'' if step == 1 else f', {step}'})"
 
@@ -214,13 +206,11 @@ class Lanes(Printer):
         return super().load(array, index, width) if width is None else f"load({array}, {self.text(index)}, {width})"
 
     def store(self, array: str, index: Index, value: Expression) -> str:
-        """Return the text that stores a register."""
         if not isinstance(index, Expression):
             raise TypeError("arrays of lanes have one index; this is a mistake in the program")
         return f"store({array}, {self.text(index)}, {self.text(value)})"
 
     def accumulate(self, array: str, index: Index, value: Expression) -> str:
-        """Return the text that adds a register to a register in memory."""
         return self.store(array, index, plus(Load(array, index), value) if isinstance(index, Expression) else value)
 
     def statement(self, s: Statement) -> list[str]:
@@ -230,7 +220,6 @@ class Lanes(Printer):
         return broken(lines[0]) if is_long else lines
 
     def function(self, f: Function) -> str:
-        """Return a function with its head."""
         head = [f"@njit(error_model='numpy'{OPTIONS[f.role]})", f"def {f.name}({', '.join(f.arguments)}):"]
         return "\n".join([*head, f'    """{f.about}"""', *self.indented(f.body)])
 
@@ -265,8 +254,6 @@ class Math(Printer):
 
 
 class C(Printer):
-    """Print C99."""
-
     functions = functions.C99
     words: Mapping[str, str] = {"and": " && ", "or": " || ", "not": "!"}
     choice = "({} ? {} : {})"
@@ -296,7 +283,6 @@ class C(Printer):
         return f"{array}[{row}*DIMENSION + {column}]"
 
     def loop(self, index: str, start: Expression, stop: Expression, step: int) -> str:
-        """Return the head of a loop."""
         sign, by = "<" if step > 0 else ">", "++" if step == 1 else f" += {step}"
         return f"for (int {index} = {self.text(start)}; {index} {sign} {self.text(stop)}; {index}{by})"
 
@@ -306,7 +292,6 @@ class C(Printer):
         return [*lines, f"{end} while ({condition});"]
 
     def block(self, head: str, body: Iterable[Statement]) -> list[str]:
-        """Return statements in braces."""
         return [f"{head} {{", *self.indented(body), "}"]
 
     def titled(self, title: str, body: Iterable[Statement]) -> list[str]:

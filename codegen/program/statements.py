@@ -24,8 +24,6 @@ Index: TypeAlias = Expression | tuple[Expression, Expression]  # the index of an
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """Store a value in an array."""
-
     array: str
     index: Index
     value: Expression
@@ -33,8 +31,6 @@ class Store:
 
 @dataclass(frozen=True, slots=True)
 class Accumulate:
-    """Add a value to an element of an array."""
-
     array: str
     index: Index
     value: Expression
@@ -42,16 +38,12 @@ class Accumulate:
 
 @dataclass(frozen=True, slots=True)
 class Array:
-    """Make an array."""
-
     name: str
     size: Expression
 
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Make a unit matrix."""
-
     name: str
     size: Expression
 
@@ -77,8 +69,6 @@ class Repeat:
 
 @dataclass(frozen=True, slots=True)
 class If:
-    """Run statements if a condition holds."""
-
     condition: Expression
     body: tuple[Statement, ...]
 
@@ -93,8 +83,6 @@ class Titled:
 
 @dataclass(frozen=True, slots=True)
 class Comment:
-    """Write a comment."""
-
     text: str
 
 
@@ -107,8 +95,6 @@ class Do:
 
 @dataclass(frozen=True, slots=True)
 class Return:
-    """Return results, with a comment."""
-
     values: tuple[Expression, ...]
     remark: str = ""
 
@@ -128,8 +114,6 @@ class Role(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """A function of a kernel."""
-
     name: str
     arguments: tuple[str, ...]
     about: str
@@ -148,12 +132,10 @@ def whole(name: str, value: Value) -> Assign:
 
 
 def store(array: str, index: Value, value: Value) -> Store:
-    """Return the statement that stores a value."""
     return Store(array, as_expression(index), as_expression(value))
 
 
 def accumulate(array: str, index: Value, value: Value) -> Accumulate:
-    """Return the statement that adds a value to an element."""
     return Accumulate(array, as_expression(index), as_expression(value))
 
 
@@ -176,7 +158,6 @@ def values(statements: Iterable[Statement]) -> Iterator[Expression]:
 
 
 def called(statements: Iterable[Statement]) -> set[str]:
-    """Return the names of the functions that are called."""
     return {e.function for value in values(statements) for e in value.walk() if isinstance(e, Call)}
 
 

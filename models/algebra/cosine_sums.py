@@ -36,12 +36,10 @@ class AngleSum:
 
     @classmethod
     def rational(cls, value: Fraction | int) -> AngleSum:
-        """Make the sum without cosines, a rational number."""
         return cls(Fraction(value))
 
     @classmethod
     def cosine(cls, a: Fraction | int, b: Fraction | int, k: int, m: int) -> AngleSum:
-        """Make the sum a + 2 b cos(2πk/m)."""
         return _collected(Fraction(a), [(Fraction(k, m), Fraction(b))])
 
     def __add__(self, other: AngleSum) -> AngleSum:
@@ -106,7 +104,6 @@ class AngleSum:
             bits *= 2
 
     def vanishes(self) -> bool:
-        """Return whether the number is exactly 0."""
         if not self.terms:
             return self.shift == 0
         # Write the sum as a polynomial in exp(2πi/m): the sum is 0 if the cyclotomic polynomial divides this one.

@@ -41,7 +41,6 @@ class _Field:
 
 
 def equal(a: Number, b: Number) -> bool:
-    """Return whether two algebraic numbers are exactly equal."""
     if a is b or (isinstance(a, sp.Expr) and isinstance(b, sp.Expr) and a == b):
         return True
     return bool(_compared((a,), (b,)) == 0)

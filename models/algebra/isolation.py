@@ -36,7 +36,6 @@ class Disc:
 
     @property
     def ball(self) -> acb:
-        """Return a ball that contains the disc."""
         return self.within(1)
 
     def within(self, times: int) -> acb:

@@ -9,17 +9,14 @@ from flint import fmpq
 
 
 def to_fraction(x: fmpq | sp.Rational) -> Fraction:
-    """Return a rational number of FLINT or SymPy as a Fraction."""
     return Fraction(int(x.p), int(x.q))
 
 
 def to_flint(x: Fraction | sp.Rational) -> fmpq:
-    """Return a Fraction or a rational number of SymPy as an fmpq."""
     return fmpq(int(x.numerator), int(x.denominator))
 
 
 def to_sympy(x: Fraction | fmpq) -> sp.Rational:
-    """Return a Fraction or an fmpq as a rational number of SymPy."""
     if isinstance(x, Fraction):
         return sp.Rational(x.numerator, x.denominator)
     return sp.Rational(int(x.p), int(x.q))

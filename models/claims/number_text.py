@@ -32,7 +32,6 @@ _DECIMAL = re.compile(r"(?<![A-Za-z_])(?:[0-9]+\.[0-9]*|\.[0-9]+|[0-9]+(?=[eE][+
 
 
 def exact_number(text: str, values: Mapping[str, int] | None = None) -> sp.Expr:
-    """Return the value of an exact expression."""
     stripped = text.strip()
     if len(stripped) > LENGTH:
         raise ValueError(f"number written as {len(stripped)} characters; expected at most {LENGTH}; shorten it")

@@ -61,8 +61,6 @@ _DECIMAL = re.compile(r"[+-]?[0-9]{1,40}\.[0-9]{1,60}")
 
 @dataclass(frozen=True, slots=True)
 class PartClaim:
-    """A claim about one part of a spectrum."""
-
     text: str  # the claim in the file
     word: str  # one of WORDS
     relation: str  # one of = < > <= >=

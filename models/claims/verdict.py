@@ -38,7 +38,6 @@ class ClaimVerdict:
 
     @property
     def eigenvalues(self) -> Sequence[Eigenvalue]:
-        """The eigenvalues of the graph."""
         return spectrum(self.claim.graph, Proof.EXACT if self.problems else Proof.NONE).eigenvalues
 
     @property
@@ -138,7 +137,6 @@ def _middle(number: sp.Expr | Root) -> complex:
 
 
 def _is_between(low: Fraction, e: Eigenvalue, high: Fraction) -> bool:
-    """Return whether a real eigenvalue lies in a closed interval."""
     if not isinstance(e.number, Root) and e.number.is_Rational:
         return low <= to_fraction(e.number) <= high
     for bits in (64, 512, 4096):

@@ -53,7 +53,6 @@ class Term:
 
     @property
     def symbols(self) -> set[sp.Symbol]:
-        """All symbols of the term, except NODE."""
         ends = [end for index in (*self.indices, *self.numbered) for end in index]
         return set().union(*(sp.S(part).free_symbols for part in (self.value, self.times, self.where, *ends)))
 
@@ -72,8 +71,6 @@ class Term:
                     yield self.vector.subs(all_values).doit()
 
     def replaced(self, new: Mapping[sp.Symbol, sp.Expr]) -> Term:
-        """Substitute expressions for symbols, all at once."""
-
         def put(part: object) -> object:
             return sp.S(part).xreplace(dict(new))
 
@@ -98,8 +95,6 @@ def _with_indices(indices: tuple[Index, ...], values: dict[sp.Symbol, int]) -> I
 
 @dataclass(frozen=True, slots=True)
 class ClosedForm:
-    """The spectrum of a family or product in symbols."""
-
     terms: tuple[Term, ...]  # the eigenvalues
     size: sp.Expr = N  # the number of nodes
     options: Mapping[str, object] = field(default_factory=dict)  # option of the family -> expression in the symbols
@@ -118,7 +113,6 @@ class ClosedForm:
         return tuple(sorted(self.size.free_symbols | self.where.free_symbols, key=str))
 
     def least_of(self, symbol: sp.Symbol) -> int:
-        """Return the smallest number for a symbol."""
         return self.lowest.get(symbol, self.least)
 
     def at(self, **numbers: int) -> list[tuple[sp.Expr, int]]:
@@ -163,7 +157,6 @@ class ClosedForm:
 
     @property
     def text(self) -> str:
-        """The closed form as lines of text."""
         rows = [f"{self.name}, n = {sp.sstr(self.size)} nodes" if self.size != N else f"{self.name} of n nodes"]
         for term in self.terms:
             rows.append(f"  {term.text}")

@@ -72,8 +72,6 @@ def counters(sizes: Sequence[sp.Expr]) -> tuple[sp.Symbol, ...]:
 
 
 def renamed(form: ClosedForm, new: Mapping[sp.Symbol, sp.Expr]) -> ClosedForm:
-    """Replace symbols of a form by other symbols or by numbers."""
-
     def put(part: sp.Expr | None) -> sp.Expr | None:
         return None if part is None else sp.S(part).xreplace(dict(new))
 

@@ -263,7 +263,6 @@ class FamilyRule:
 
     @property
     def undirected(self) -> bool:
-        """True if the family is undirected."""
         return not self.family.directed
 
     @property

@@ -112,22 +112,18 @@ class GraphMatrix(Exact):
 
     @property
     def name(self) -> str:
-        """Name of the matrix in messages."""
         return f"{self.graph.name}, {self.kind}"
 
     @property
     def n(self) -> int:
-        """Number of rows."""
         return self.graph.n
 
     @property
     def options(self) -> tuple[tuple[str, object], ...]:
-        """The options of the graph."""
         return self.graph.options
 
     @property
     def link_count(self) -> int:
-        """The number of entries outside the diagonal."""
         return self.graph.link_count
 
     @property

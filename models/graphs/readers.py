@@ -159,7 +159,6 @@ def from_graph(graph: Any, weight: str | None = "weight", name: str = "graph") -
 
 
 def is_graph(value: object) -> bool:
-    """Return whether a value is a Topology or a graph of networkx."""
     return isinstance(value, Topology) or all(hasattr(value, need) for need in ("nodes", "edges", "is_directed"))
 
 

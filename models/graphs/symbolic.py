@@ -43,12 +43,10 @@ class SymbolicTopology:
 
     @property
     def symbols(self) -> tuple[sp.Symbol, ...]:
-        """The symbols of all weights, sorted by name."""
         return tuple(sorted(set().union(*(w.free_symbols for _, _, w in self.links)), key=str))
 
     @property
     def matrix(self) -> sp.ImmutableDenseMatrix:
-        """The connectivity matrix G; every row sums to zero."""
         rows = sp.zeros(self.n)
         for target, source, w in self.links:
             rows[target, source] = w

@@ -105,7 +105,6 @@ class Expressions(Algebra[sp.Basic]):
     functions: ClassVar[Mapping[str, Callable[..., sp.Expr]]]  # by name, in the order of messages
 
     def read(self, expression: ParsedText) -> sp.Expr:
-        """Return the value of an expression."""
         value = self.meaning(expression, self.value)
         steep = [e for e in value.atoms(sp.Pow) if e.exp.is_number and not abs(e.exp) <= EXPONENT]
         if steep:

@@ -49,8 +49,6 @@ def check_methods(kind: type) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Arguments:
-    """The argument list of a function."""
-
     name: str  # the function's name, the class's for `__init__`
     positional: tuple[str, ...]  # arguments that may be given by position, `self` among them
     names: tuple[str, ...]  # all arguments but `self`

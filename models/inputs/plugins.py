@@ -167,7 +167,6 @@ def load(kind: PluginKind, name: str) -> Any:
 
 
 def is_shipped(kind: PluginKind, name: str) -> bool:
-    """Return True for a plug-in of this package."""
     return not isinstance(name, OwnFile) and name in _shipped(kind)
 
 

@@ -64,43 +64,33 @@ class Algebra(Generic[V]):
         raise NoMeaning
 
     def number(self, value: int | float) -> V:
-        """Return the value of a literal number, which is never negative."""
         raise NoMeaning
 
     def name(self, name: str) -> V:
-        """Return the value of a name."""
         raise NoMeaning
 
     def positive(self, value: V) -> V:
-        """+ value."""
         raise NoMeaning
 
     def negative(self, value: V) -> V:
-        """- value."""
         raise NoMeaning
 
     def add(self, a: V, b: V) -> V:
-        """a + b."""
         raise NoMeaning
 
     def subtract(self, a: V, b: V) -> V:
-        """a - b."""
         return self.add(a, self.negative(b))
 
     def multiply(self, a: V, b: V) -> V:
-        """a * b."""
         raise NoMeaning
 
     def divide(self, a: V, b: V) -> V:
-        """a / b."""
         raise NoMeaning
 
     def remainder(self, a: V, b: V) -> V:
-        """a % b."""
         raise NoMeaning
 
     def power(self, base: V, exponent: V) -> V:
-        """base ** exponent."""
         raise NoMeaning
 
     def whole_power(self, base: V, exponent: int) -> V:
@@ -141,19 +131,15 @@ class Arithmetic(Algebra[V]):
         raise NoMeaning
 
     def positive(self, value: V) -> V:
-        """+ value."""
         return value
 
     def negative(self, value: Any) -> V:
-        """- value."""
         return cast("V", -value)
 
     def add(self, a: Any, b: Any) -> V:
-        """a + b."""
         return self.checked(a + b)
 
     def multiply(self, a: Any, b: Any) -> V:
-        """a * b."""
         return self.checked(a * b)
 
 

@@ -209,8 +209,6 @@ def _with_law(e: sp.Expr, law: sp.Expr, state: tuple[sp.Symbol, ...]) -> sp.Expr
 
 
 class _NetworkText:
-    """Writes the equations of a network in one style."""
-
     def __init__(self, equations: Equations, style: Style) -> None:
         self.equations, self.style = equations, style
         self.named = tuple(_NamedNode.of(node) for node in equations.nodes)

@@ -139,7 +139,6 @@ class _TokenReader:
         return f"<mo{form}>{escape(SIGNS.get(token, token))}</mo>"
 
     def group_text(self) -> str:
-        """Read a group as plain text."""
         self.at += 1
         start, depth = self.at, 1
         while depth:

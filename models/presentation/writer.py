@@ -44,7 +44,6 @@ class Latex:
     dots = "\\dots"
 
     def words(self, text: str) -> str:
-        """Write words between formulae."""
         return rf"\text{{{text}}}"
 
     def letter(self, name: str, index: str = "", primes: int = 0) -> str:
@@ -140,14 +139,11 @@ Style: TypeAlias = Latex | Text  # a style: methods that join the parts of a for
 
 @dataclass(frozen=True, slots=True)
 class ExpressionWriter:
-    """Writes expressions in one style."""
-
     style: Style  # LaTeX or text
     letters: Mapping[sp.Symbol, str]  # symbol -> written form; other symbols are written by name
     variables: frozenset[sp.Symbol]  # symbols written after the parameters in products
 
     def total(self, terms: Iterable[sp.Expr]) -> str:
-        """Write a sum of terms in their order; 0 for an empty sum."""
         text = ""
         for term in map(_turned, terms):
             negative = _negative(term)
@@ -156,7 +152,6 @@ class ExpressionWriter:
         return text or "0"
 
     def write(self, e: sp.Expr) -> str:
-        """Write an expression as text."""
         if isinstance(e, sp.Symbol):
             return self.letters.get(e, self.style.letter(e.name))
         if e.is_Add:
@@ -195,7 +190,6 @@ class ExpressionWriter:
         return self.style.product([self.style.beside(front), *self.factors(variable)])
 
     def _part(self, e: sp.Expr) -> str:
-        """Write the numerator or denominator of a fraction."""
         if e.is_Mul:
             return self.style.product(self.factors(e))
         return self.write(e) if self.style.bars else self._factor(e)

@@ -47,7 +47,6 @@ class Eigenspace:
 
     @property
     def dimension(self) -> int:
-        """Number of independent eigenvectors."""
         return len(self.basis)
 
     @property
@@ -123,7 +122,6 @@ def eigenspaces(matrix: Matrix) -> tuple[Eigenspace, ...]:
 
 
 def _rational(matrix: Matrix) -> fmpq_mat:
-    """Convert the matrix to rational numbers of FLINT."""
     rows = fmpq_mat(matrix.n, matrix.n)
     for i, j, number in matrix.entries:
         rows[i, j] = to_flint(number)

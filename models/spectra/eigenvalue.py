@@ -215,7 +215,6 @@ def _midpoint(e: Eigenvalue, bits: int = 4200) -> fmpq:
 
 
 def decimal(value: float | complex) -> str:
-    """Return a float, or a complex number, as text."""
     if isinstance(value, complex):
         return f"{value.real:.15g} {'-' if value.imag < 0 else '+'} {abs(value.imag):.15g}i"
     return f"{value:.16g}"

@@ -40,7 +40,6 @@ class JointEigenvalue:
 
     @property
     def values(self) -> tuple[float | complex, ...]:
-        """The eigenvalue of each graph as the nearest float."""
         return tuple(part.value for part in self.parts)
 
     def __str__(self) -> str:

@@ -121,7 +121,6 @@ def _claimed(claims: Sequence[tuple[Powers, int]], m: int, p: int) -> nmod_poly:
 
 
 def _characteristic(graph: Matrix, p: int) -> nmod_poly:
-    """Return det(z - G) modulo p."""
     # Convert each distinct weight only once.
     residues: dict[Fraction, int] = {}
     entries = {(i, i): 0 for i in range(graph.n)}

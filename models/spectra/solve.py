@@ -83,7 +83,6 @@ def spectrum(graph: Matrix, proof: Proof | None = None) -> Spectrum:
 
 
 def has_closed_form(graph: Matrix) -> bool:
-    """Return whether a graph has a closed form of its eigenvalues."""
     return graph.closed_form() is not None
 
 

@@ -35,7 +35,6 @@ class SymbolicSpectrum:
 
     @property
     def text(self) -> str:
-        """The spectrum as lines of text."""
         rows = [f"characteristic polynomial: {sp.sstr(_product(self.factors))}"]
         rows += [f"  {sp.sstr(root)}{_often(count)}" for root, count in self.eigenvalues]
         rows += [f"  the roots of {sp.sstr(f.as_expr())}{_often(count)}" for f, count in self.unsolved]

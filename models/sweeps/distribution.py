@@ -19,8 +19,6 @@ KNOWN = "normal(mean, deviation), uniform(low, high), lorentzian(centre, half wi
 
 
 class Distribution(Word):
-    """The kinds of distributions."""
-
     NORMAL = "normal"
     UNIFORM = "uniform"
     LORENTZIAN = "lorentzian"

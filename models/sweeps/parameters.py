@@ -219,7 +219,6 @@ def at_links(model: Model, values: Mapping[str, object]) -> Iterator[tuple[Any, 
 
 
 def drive(model: Model, values: Mapping[str, float]) -> Drive:
-    """Return the drive of a model at parameter values."""
     timed = any(coupling.forced for coupling, _ in model.linked)
     differing = varied(values, model.parameters)
     edges = model.equations(differing).edges if timed else ()

@@ -235,7 +235,6 @@ class _NumberField:
         self.theta = fmpq_poly([0, 1]) % self.polynomial
 
     def times(self, a: Polynomial, b: Polynomial) -> Polynomial:
-        """Return a product."""
         return a * b % self.polynomial
 
     def inverse(self, a: Polynomial) -> Polynomial:

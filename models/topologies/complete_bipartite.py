@@ -29,7 +29,6 @@ def edges(n: int, *, left: int | None = None) -> Iterator[tuple[int, int, int]]:
 
 
 def count(n: int, *, left: int | None = None) -> int:
-    """Return the number of edges: left times right."""
     p = left or n // 2
     return p * (n - p)
 

@@ -12,7 +12,6 @@ from ..inputs.options import integer_option, probability_option
 
 
 def settle(n: int, p: object, seed: object) -> dict[str, object]:
-    """Check the probability and the seed."""
     return {"p": probability_option("p", p), "seed": integer_option("seed", seed, 0)}
 
 

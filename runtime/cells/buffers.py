@@ -57,7 +57,6 @@ class Buffers:
 
     @property
     def status(self) -> np.ndarray:
-        """Status (cells,) of each cell; a view of `counts`."""
         return self.counts[:, Count.STATUS]
 
     @property
@@ -67,11 +66,9 @@ class Buffers:
 
     @property
     def steps(self) -> np.ndarray:
-        """Accepted and rejected steps (cells,) of each cell."""
         return np.asarray(self.counts[:, Count.ACCEPTED] + self.counts[:, Count.REJECTED])
 
     def take(self, cells: np.ndarray) -> Buffers:
-        """Return copies of the rows of some cells."""
         lanes = self.lanes[cells] if len(self.lanes) else self.lanes
         return Buffers(
             self.end[cells], self.sums[cells], self.counts[cells], self.points[cells], self.samples[cells], lanes
@@ -89,12 +86,10 @@ class Buffers:
 
     @property
     def point_counts(self) -> np.ndarray:
-        """Number of section points of each cell (cells,)."""
         return self.counts[:, Count.POINTS]
 
     @property
     def most_points(self) -> int:
-        """Largest number of section points of a cell."""
         return int(self.point_counts.max(initial=0))
 
     def widen(self, room: int) -> None:

@@ -30,14 +30,12 @@ class Layout:
 
     @classmethod
     def of(cls, scene: Scene, size: int) -> Layout:
-        """Return the layout of a scene's sweep in blocks of this size."""
         if not scene.continued:
             return cls(scene.cells, size)
         return cls(scene.cells, size, scene.shape[-1], scene.continuation == "down")
 
     @property
     def blocks(self) -> int:
-        """Number of blocks."""
         steps = max(self.columns, 1)
         return math.ceil(self.cells / steps / self.size) * steps
 
@@ -53,13 +51,11 @@ class Layout:
 
     @property
     def lengths(self) -> np.ndarray:
-        """Number of cells in each block. Shapes: (blocks,)."""
         steps = max(self.columns, 1)
         first = np.arange(self.blocks) // steps * self.size  # row of a continued sweep, else cell
         return np.minimum(self.size, self.cells // steps - first)
 
     def rows(self, block: int) -> np.ndarray:
-        """Return the numbers of the cells of a block."""
         if not self.columns:
             return np.arange(block * self.size, min((block + 1) * self.size, self.cells))
         group, step = divmod(block, self.columns)

@@ -63,7 +63,6 @@ class ObservableArrays:
 
     @cached_property
     def _tallies_of(self) -> dict[sp.Expr, slice]:
-        """The tallies of each value."""
         slices, first = {}, 0
         for value, rows in self._rows.items():
             slices[value] = slice(first, first + rows)

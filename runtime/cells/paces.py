@@ -287,7 +287,6 @@ def _link_part(
 
 
 def _flat(block: Block) -> tuple[sp.Expr, ...]:
-    """Return the entries of a block, row by row."""
     return tuple(e for row in block for e in row)
 
 

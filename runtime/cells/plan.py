@@ -41,7 +41,6 @@ class CellRows:
         return len(self.start)
 
     def take(self, cells: np.ndarray) -> CellRows:
-        """Return the rows of some of the cells."""
         return CellRows(self.start[cells], self.numbers[cells], self.spans[cells])
 
 
@@ -78,7 +77,6 @@ class Planner:
         return columns | {name: values[indices[-1]] for name, values in self.drawn.items()}
 
     def rows(self, cells: np.ndarray, near: np.ndarray | None = None) -> CellRows:
-        """Return the rows of these cells."""
         # `near` (cells,) is the column `SpanColumn.NEAR` of their spans (default: 0).
         columns = self.columns(cells)
         parameters = self._parameters(columns, len(cells))
@@ -140,7 +138,6 @@ class Planner:
         return self.rows(np.union1d(self._extremes(), spread.round().astype(int)))
 
     def _extremes(self) -> np.ndarray:
-        """Return the numbers of the extreme cells."""
         if not self.scene.shape:
             return np.arange(1)
         ends = [_ends(values) for values in self.values.values()]

@@ -109,7 +109,6 @@ class ReducedScene:
 
     @property
     def dimension(self) -> int:
-        """Number of states of the reduced network."""
         return len(self.merge.states)
 
     @property
@@ -123,7 +122,6 @@ class ReducedScene:
         return Sections(self.scene).width(self.dimension)
 
     def empty(self, cells: int, room: int, observed: int | None = None) -> Buffers:
-        """Return empty buffers for cells of the reduced network."""
         # `observed`: number of tallies, by default of observables.
         observed = self.observed.numbers if observed is None else observed
         return Buffers.empty(cells, self.dimension, room, self.samples, observed, self.point_size)
@@ -218,7 +216,6 @@ def reduce_scene(
 
 
 def _fixed(scene: Scene) -> dict[str, float]:
-    """Return the parameters with one value in every cell."""
     swept = {axis.name: axis.values for axis in (*scene.axes, *scene.drawn)}
     values = {name: swept.get(name, (scene.parameters[name],)) for name in scene.equations.parameters}
     return {name: row[0] for name, row in values.items() if min(row) == max(row)}

@@ -126,7 +126,6 @@ class Given:
         return values
 
     def _refusal(self, scene: Scene, name: str, states: bool) -> str:
-        """Return the error message for a name that is not accepted."""
         arguments = inspect.signature(self.function).parameters.values()
         keywords = [a.name for a in arguments if a.kind is not a.VAR_KEYWORD and a.name != "scene"]
         of = self.function.__name__

@@ -22,7 +22,6 @@ OPTIONS = (
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the scene, the starts, the attractors and the criterion."""
     add_changed_scene(
         parser, more="lists and ranges of parameters are swept, those of initial states are a grid of starts"
     )

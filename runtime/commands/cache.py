@@ -12,7 +12,6 @@ EXAMPLES = ("synchain cache info", "synchain cache clear", "synchain cache warm"
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add what to do."""
     parser.add_argument(
         "action",
         choices=("info", "clear", "warm"),
@@ -23,7 +22,6 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Describe, empty or fill the cache."""
     if arguments.json and arguments.action != "info":
         raise WrongUse(f"found --json with {arguments.action}; expected it with info; leave it out")
     if arguments.action == "warm":

@@ -26,7 +26,6 @@ SHOWN = 3  # wrong sizes that are described of a line about a range of n
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the file and the forms of the report."""
     parser.add_argument(
         "file",
         metavar="FILE",
@@ -37,7 +36,6 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Check every claim; exit code 1 where one is wrong."""
     from synchain.models.claims.language import read_claims
     from synchain.models.claims.verdict import verify
 
@@ -67,12 +65,10 @@ def execute(arguments: Namespace) -> int:
 
 
 def _wrong(judged: Sequence[Sequence[ClaimVerdict]]) -> int:
-    """Return the number of lines with a wrong claim."""
     return sum(not all(v.right for v in line) for line in judged)
 
 
 def _print(arguments: Namespace, judged: Sequence[Sequence[ClaimVerdict]], undecided: Sequence[Undecided]) -> None:
-    """Print all claims as JSON or text."""
     wrong = _wrong(judged)
     if arguments.json:
         claims = [_as_dict(line) for line in judged]

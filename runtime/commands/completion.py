@@ -42,7 +42,6 @@ end""",
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the shell."""
     parser.add_argument("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))
 
 

@@ -41,7 +41,6 @@ Answer = tuple[str, str, str]  # outcome, what was found, what helps
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the form of the report."""
     parser.add_argument("--json", action="store_true", help="one JSON value on stdout")
 
 
@@ -65,20 +64,16 @@ def execute(arguments: Namespace) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """The outcome of one check."""
-
     name: str  # what was checked
     outcome: str  # "fine", "doubtful" or "wrong"
     found: str  # what the check saw
     remedy: str = ""  # what the user can do; empty if the outcome is fine
 
     def as_dict(self) -> dict[str, str]:
-        """Return the check in JSON types."""
         return {"name": self.name, "outcome": self.outcome, "found": self.found, "remedy": self.remedy}
 
 
 def examine(checks: Mapping[str, Callable[[], Answer]] | None = None) -> Iterator[Check]:
-    """Run checks one after the other."""
     for name, check in (CHECKS if checks is None else checks).items():
         try:
             outcome, found, remedy = check()

@@ -22,7 +22,6 @@ SOURCES = {
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the scene and the form."""
     add_changed_scene(parser)
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--latex", action="store_true", help="print LaTeX")
@@ -32,7 +31,6 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Print the equations as text, LaTeX, JSON or source."""
     from synchain.models.presentation.equations_text import as_dict, latex, text
 
     with wrong_use():

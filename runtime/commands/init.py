@@ -13,7 +13,6 @@ EXAMPLES = ("synchain init my_scene", "synchain init ring --dir scenes")
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the name and the folder."""
     parser.add_argument("name", metavar="NAME", help="letters, digits, - and _, e.g. my_scene; the file is NAME.toml")
     add_directory(parser)
 

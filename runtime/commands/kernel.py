@@ -12,7 +12,6 @@ EXAMPLES = ("synchain kernel figure_4a", "synchain kernel figure_4a --driver")
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the scene and what to print."""
     add_changed_scene(parser)
     parser.add_argument(
         "--driver",

@@ -14,13 +14,11 @@ Row: TypeAlias = "dict[str, Any]"  # name and summary of a part, and what else J
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the kind."""
     parser.add_argument("kind", metavar="KIND", choices=tuple(LISTS), help=", ".join(LISTS))
     parser.add_argument("--json", action="store_true", help="print JSON: a list of names, summaries and more")
 
 
 def execute(arguments: Namespace) -> int:
-    """Print a line for each part."""
     rows = LISTS[arguments.kind]()
     if arguments.json:
         print_json(rows)
@@ -49,7 +47,6 @@ def _parts(kind: str) -> list[Row]:
 
 
 def _graphs() -> list[Row]:
-    """Return the families of graphs."""
     from synchain.models.graphs.families import family, names
 
     return [
@@ -59,7 +56,6 @@ def _graphs() -> list[Row]:
 
 
 def _scenes() -> list[Row]:
-    """Return the shipped scenes with their titles."""
     import tomllib
     from importlib import resources
 

@@ -18,7 +18,6 @@ OPTIONS = ("count", "precision", "periods", "transient")  # keywords of `synchai
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the scene and the length of the average."""
     add_changed_scene(parser)
     parser.add_argument("--count", metavar="K", type=positive, help="number of largest exponents (default: all)")
     parser.add_argument(

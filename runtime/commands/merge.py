@@ -14,7 +14,6 @@ EXAMPLES = (
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the parts and the result."""
     parser.add_argument("parts", metavar="PART", nargs="+", help="the files .KofN.partial of all N parts, in any order")
     parser.add_argument(
         "--out", metavar="FILE", required=True, help="the result, which ends in .nc, .nc4 or .zarr; the parts are kept"

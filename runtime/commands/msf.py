@@ -45,7 +45,6 @@ POINTS = 1_000_000  # most points of one plane
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add oscillator, network, strengths and effort."""
     add_scene(parser, default="the oscillator of table 1")
     parser.add_argument(
         "--alpha",

@@ -18,7 +18,6 @@ LENGTH = 40  # most characters of a name, a choice
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the kind, the name and the folder."""
     parser.add_argument("kind", metavar="KIND", choices=tuple(HOMES), help=", ".join(HOMES))
     parser.add_argument("name", metavar="NAME", help="small letters, digits and underscores, e.g. my_law")
     add_directory(parser)
@@ -62,7 +61,6 @@ def write_template(kind: str, name: str, directory: str, ending: str) -> Path:
 
 
 def add_directory(parser: ArgumentParser) -> None:
-    """Add --dir."""
     parser.add_argument("--dir", metavar="DIR", type=folder, default=".", help="where to write (default: this folder)")
 
 

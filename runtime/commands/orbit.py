@@ -22,7 +22,6 @@ EXAMPLES = (
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the scene, the number of periods and the parameter."""
     add_changed_scene(parser)
     parser.add_argument("--periods", metavar="K", type=positive, help="drive periods of the orbit (default: 1)")
     parser.add_argument("--follow", metavar="NAME=LO:HI:N", help="follow the orbit along this parameter, from LO to HI")

@@ -15,7 +15,6 @@ EXAMPLES = ("synchain paper --out figures", "synchain paper 4b 5 --quick", "sync
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add names, folder and effort."""
     parser.add_argument(
         "names",
         metavar="FIGURE",
@@ -30,7 +29,6 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Make the figures and print the names of their files."""
     import matplotlib
 
     matplotlib.use("Agg")

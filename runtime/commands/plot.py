@@ -18,7 +18,6 @@ DOTS = 200  # dots per inch of a bitmap, as in figures of the paper (a choice)
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the file, the kind of plot and the picture."""
     parser.add_argument("file", metavar="FILE", help="a .nc, .nc4, .zarr or .partial file")
     parser.add_argument(
         "--kind",
@@ -32,7 +31,6 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Draw the value and print the name of the picture."""
     from ..plots.canvas import off_screen
     from ..results.open import open_result
     from ..results.result import Result

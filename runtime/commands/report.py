@@ -16,7 +16,6 @@ EXAMPLES = (
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the scene, the file and the effort."""
     add_changed_scene(parser, more="a,b,c or LO:HI:N sweeps a parameter or an initial state")
     parser.add_argument("--out", metavar="FILE", required=True, help="the page, which ends in .html")
     parser.add_argument("--quick", action="store_true", help="coarse grids: at most 25 values of each axis")
@@ -24,7 +23,6 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Compute what there is to say and write the page."""
     from pathlib import Path
 
     from ..reports.scene_report import QUICK, Effort, report

@@ -12,7 +12,6 @@ EXAMPLES = ("synchain reproduce --list", "synchain reproduce bayani_2024", "sync
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the name, the list and JSON."""
     parser.add_argument("name", metavar="PAPER", nargs="?", help="a name that --list prints")
     parser.add_argument("--list", action="store_true", help="list the papers, with titles and citations")
     parser.add_argument("--json", action="store_true", help="print JSON: published, found and difference by quantity")

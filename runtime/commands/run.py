@@ -42,7 +42,6 @@ PATIENCE = 10  # seconds that a Dask scheduler has to answer
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add scene, folder and changes to the scene."""
     parser.usage = (
         "synchain run SCENE --out DIR [--rtol X] [--t-eval TIMES] [--workers N]\n"
         "                    [--set NAME=VALUE ...] [--format FORMAT] [--resume | --overwrite] [--part K/N]\n"

@@ -15,7 +15,6 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Print the schema."""
     from synchain.models.scenes.schema import schema
 
     print_json(schema())

@@ -16,7 +16,6 @@ EXAMPLES = (
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the file and the form."""
     parser.add_argument(
         "file", metavar="FILE", help="a .nc, .nc4 or .zarr file, or the .partial file of a run that is not finished"
     )
@@ -24,7 +23,6 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Print what print(open_result(FILE)) prints."""
     from ..results.open import open_result
 
     with wrong_use():

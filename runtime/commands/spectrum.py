@@ -34,7 +34,6 @@ CHECKED = 1000  # most nodes for which they are multiplied out modulo primes; th
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add topology, size and options, or a file."""
     parser.add_argument(
         "topology", metavar="TOPOLOGY", nargs="?", help="a family of graphs (see: synchain list graphs), or a product"
     )
@@ -78,7 +77,6 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Print the spectrum as a table or as JSON."""
     if arguments.value and not (arguments.symbolic and arguments.matrix):
         raise WrongUse("found --value without --symbolic --matrix FILE; expected all of them")
     from synchain.models.spectra.solve import Proof, spectrum

@@ -29,7 +29,6 @@ COARSE = 2e-3  # width in sigma to which a first look refines the ends of the ra
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add network, drive, grid and criterion."""
     add_changed_scene(parser, default="oscillators of table 1")
     add_network(parser)
     parser.add_argument(
@@ -55,7 +54,6 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Print the summary of the synchronous ranges, or JSON."""
     from ..engines.scene_kernels import kernel_source
     from ..synchronisation.hidden_modes import hidden_modes
     from ..synchronisation.threshold import check_probe, default_grid, thresholds

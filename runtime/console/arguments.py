@@ -27,7 +27,6 @@ def whole(text: str, least: int = -NODES, most: int = NODES) -> int:
 
 
 def positive(text: str, most: int = NODES) -> int:
-    """Read a whole number of at least 1."""
     return whole(text, 1, most)
 
 
@@ -56,7 +55,6 @@ def number(text: str) -> float:
 
 
 def above_zero(text: str) -> float:
-    """Read a finite number above 0."""
     value = number(text)
     if not value > 0:
         raise ArgumentTypeError(f"found {text}; expected a number above 0")
@@ -64,7 +62,6 @@ def above_zero(text: str) -> float:
 
 
 def at_least_zero(text: str) -> float:
-    """Read a finite number of at least 0."""
     value = number(text)
     if not value >= 0:
         raise ArgumentTypeError(f"found {text}; expected a number of at least 0")
@@ -72,7 +69,6 @@ def at_least_zero(text: str) -> float:
 
 
 def periods(text: str) -> float:
-    """Read a whole number of periods above 0."""
     value = above_zero(text)
     if not value.is_integer():
         raise ArgumentTypeError(f"found {text}; expected a whole number of periods")
@@ -151,7 +147,6 @@ def part(text: str) -> tuple[int, int]:
 
 
 def add_set(parser: ArgumentParser, text: str) -> None:
-    """Add the option --set with its help."""
     parser.add_argument("--set", metavar="NAME=VALUE", nargs="+", action="extend", type=setting, default=[], help=text)
 
 
@@ -177,5 +172,4 @@ def add_allow_code(parser: ArgumentParser) -> None:
 
 
 def add_workers(parser: ArgumentParser) -> None:
-    """Add the option --workers."""
     parser.add_argument("--workers", metavar="N", type=positive, help="number of threads (default: all cores)")

@@ -31,7 +31,6 @@ def add_network(parser: ArgumentParser) -> None:
 
 
 def named_network(arguments: Namespace, scene: Scene | None) -> Topology | None:
-    """Return the network of --matrix, or of --topology and --n."""
     from synchain.models.graphs.families import names, topology
     from synchain.models.graphs.topology import read_matrix
 

@@ -68,7 +68,6 @@ def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[st
 
 
 def add_output(parser: ArgumentParser) -> None:
-    """Add --json and --out."""
     parser.add_argument("--json", action="store_true", help="print JSON: what as_dict() of the value returns")
     parser.add_argument(
         "-o", "--out", metavar="FILE", help="write the value to a .nc, .nc4 or .zarr file, for synchain show and plot"

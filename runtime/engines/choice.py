@@ -92,7 +92,6 @@ class Ladder:
 
     @cached_property
     def templates(self) -> Templates:
-        """Rates and slopes as numbers."""
         return Templates(self.equations)
 
     def first(self, rows: CellRows) -> np.ndarray:
@@ -214,7 +213,6 @@ class Ladder:
 
     @property
     def _explicit(self) -> int:
-        """Index of the explicit method among the methods."""
         return next(k for k, m in enumerate(self.methods) if not m.series)
 
 

@@ -73,11 +73,9 @@ class JobSpec:
 
     @classmethod
     def of(cls, problem: Problem, source: SweepKernel) -> JobSpec:
-        """Return the specification of a job of this process."""
         return cls(problem, source.width, source.digest, versions(), processor(), allowed_code())
 
     def packed(self) -> bytes:
-        """Return the specification as bytes, for a worker elsewhere."""
         target = io.BytesIO()
         head = {name: getattr(self, name) for name in ("versions", "processor", "code", "width", "digest")}
         pickle.dump(head, target)
@@ -104,7 +102,6 @@ class JobSpec:
         return cls(pickle.load(source), **head)
 
     def rebuilt(self) -> Job:
-        """Return the job, with a kernel from this installation."""
         source = self.problem.source(self.width)
         if source.digest != self.digest:
             raise InstallationError(
@@ -122,11 +119,9 @@ class SweepSpec:
     room: int | None = None
 
     def source(self, width: int) -> SweepKernel:
-        """Return the text of the kernel."""
         return write_kernel(self.reduction, width)
 
     def job(self, spec: JobSpec, kernel: Kernel) -> SweepJob:
-        """Return the job that runs the kernel."""
         return SweepJob(spec, kernel, self.reduction, LadderEngine(self.reduction, kernel, self.room))
 
 
@@ -144,7 +139,6 @@ class SweepJob:
         self.engine.cancel()
 
     def run(self, cells: np.ndarray, start: Start | None = None, near: np.ndarray | None = None) -> Buffers:
-        """Run cells of the sweep. Shapes: near (cells,)."""
         rows = self.reduction.rows(self.reduction.planner.rows(cells, near))
         if start is not None:
             rows = replace(rows, start=np.where(start[1][:, None], start[0], rows.start))
@@ -163,11 +157,9 @@ class RowsSpec:
     unroll: int = LARGEST_UNROLLED  # most nodes of a step that is written out
 
     def source(self, width: int | None = None) -> SweepKernel:
-        """Return the text of the kernel."""
         return emit(self.equations, self.integrator, self.recording, width, unroll=self.unroll)
 
     def job(self, spec: JobSpec, kernel: Kernel) -> RowsJob:
-        """Return the job that runs the kernel."""
         return RowsJob(spec, kernel, self.control.copy())
 
 
@@ -184,7 +176,6 @@ class RowsJob:
         self.control[Control.CANCEL] = 1.0
 
     def run(self, rows: CellRows) -> Buffers:
-        """Run the cells of these rows."""
         buffers = Buffers.empty(len(rows), rows.start.shape[1], room=0, samples=0)
         if self.kernel.origin.method.implicit:
             spans = rows.spans.copy()
@@ -201,11 +192,9 @@ class LadderSpec:
     reduction: ReducedScene
 
     def source(self, width: int | None = None) -> SweepKernel:
-        """Return the text of the kernel."""
         return write_kernel(self.reduction, width)
 
     def job(self, spec: JobSpec, kernel: Kernel) -> LadderJob:
-        """Return the job that runs the kernel."""
         return LadderJob(spec, LadderEngine(self.reduction, kernel, 0))
 
 
@@ -221,7 +210,6 @@ class LadderJob:
         self.engine.cancel()
 
     def run(self, rows: CellRows) -> Buffers:
-        """Run the cells of these rows."""
         return self.engine.run(rows)
 
 

@@ -50,7 +50,6 @@ class LadderEngine:
         self.kernels = {self.kernel.origin.integrator: self.kernel}
 
     def cancel(self) -> None:
-        """End all cells that run in this process."""
         with self.lock:
             for control in (self.control, *self.controls.values()):
                 control[Control.CANCEL] = 1.0
@@ -154,7 +153,6 @@ class LadderEngine:
 
 
 def run_rows(kernel: Kernel, rows: CellRows, control: np.ndarray, buffers: Buffers) -> None:
-    """Run all rows by one kernel into the buffers."""
     kernel.drive(0, len(rows), rows.start, rows.numbers, rows.spans, control, *buffers.arrays())
 
 

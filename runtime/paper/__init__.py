@@ -30,7 +30,6 @@ def names(extra: bool = False) -> tuple[str, ...]:
 
 
 def load(name: str) -> ModuleType:
-    """Return the module that makes a figure."""
     listing = _listing()
     if name not in listing:
         raise ValueError(f"unknown figure {name!r}; known: {', '.join(names(extra=True))}{suggestion(name, listing)}")

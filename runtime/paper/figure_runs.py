@@ -28,8 +28,6 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """Resolution of the figures."""
-
     points: int | None = None  # largest number of values of an axis that is run once per value; None for all
     grid: int | None = None  # number of values of sigma for the search of synchronous ranges; None for all
     criterion: AppliedCriterion = PAPER  # criterion of synchronisation

@@ -21,8 +21,6 @@ SIZE = (COLUMN, 2.5)
 
 
 class FrictionCurve(NamedTuple):
-    """Friction coefficient at relative velocities."""
-
     w: np.ndarray  # (k,): relative velocities
     sharp: np.ndarray  # (k,): set-valued law, NaN at the jump
     smooth: np.ndarray  # (k,): smoothed law

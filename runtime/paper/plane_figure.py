@@ -58,7 +58,6 @@ def texts(data: Plane) -> dict[str, str]:
 
 
 def draw(figure: Figure, data: Plane) -> Axes:
-    """Draw the plane with the rays of the network of the scene."""
     axes = figure.add_subplot()
     draw_plane(axes, data)
     return draw_rays(axes, data, SIGMA)

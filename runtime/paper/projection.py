@@ -38,8 +38,6 @@ DARK = "#bdbdbd"
 
 
 class Projection(NamedTuple):
-    """Probe, network and ranges of one figure."""
-
     scene: Scene  # network
     probe: Sweep  # two-oscillator probe in alpha
     network: Sweep  # network in sigma

@@ -14,8 +14,6 @@ from ..prediction.intervals import Interval
 
 
 class Published(NamedTuple):
-    """Published synchronous ranges of a chain."""
-
     n: int  # number of oscillators
     omega: float  # drive frequency
     intervals: tuple[Interval, ...]  # synchronous ranges of sigma, rising and disjoint

@@ -58,8 +58,6 @@ class BranchPoint:
 
 
 class SkeletonFigure(NamedTuple):
-    """Bifurcation diagram with the branches of orbits."""
-
     motion: Result  # section points over omega
     branches: tuple[tuple[BranchPoint, ...], ...]  # points of each branch in its order
 
@@ -185,7 +183,6 @@ def draw(figure: Figure, data: SkeletonFigure) -> Axes:
 
 
 def _draw_diagram(axes: Axes, data: SkeletonFigure, size: float) -> None:
-    """Draw motion, branches and bifurcations."""
     axes.plot(
         *points(data.motion).T,
         linestyle="none",

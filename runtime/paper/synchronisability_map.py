@@ -44,7 +44,6 @@ class Map(NamedTuple):
 
 
 def compute(name: str, runs: FigureRuns) -> Map:
-    """Compute the exponents of all strengths at each frequency."""
     quality = runs.quality
     grid = quality.grid or 241
     omega = np.linspace(LOW, HIGH, grid // 2 + 1 if quality.grid else 161)

@@ -35,8 +35,6 @@ Ends = tuple[float | None, float | None]  # ends of a range; None where there is
 
 @dataclass(frozen=True, slots=True)
 class ThresholdRow:
-    """Synchronous ranges of one chain at one frequency."""
-
     n: int  # number of oscillators
     omega: float  # drive frequency
     measured: tuple[Interval, ...]  # ranges of sigma
@@ -47,7 +45,6 @@ class ThresholdRow:
     cells: int  # number of all values of sigma
 
     def ranges(self, kind: str) -> tuple[Interval, ...]:
-        """Return the ranges of one of KINDS."""
         return {
             "measured": self.measured,
             "predicted": self.predicted,
@@ -80,7 +77,6 @@ class ThresholdRow:
 
     @property
     def remark(self) -> str:
-        """Remark of the paper, and remarks on the ranges."""
         remarks = [self.row.remark] if self.row else []
         if self.n == 2:
             remarks.append("the probe itself")
@@ -101,8 +97,6 @@ class ThresholdRow:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All rows and the quality of their runs."""
-
     rows: tuple[ThresholdRow, ...]
     quality: Quality
 
@@ -160,7 +154,6 @@ def texts(data: Comparison) -> dict[str, str]:
 
 
 def _record(row: ThresholdRow, quality: Quality) -> dict[str, object]:
-    """Return the columns of one row of the CSV."""
     record: dict[str, object] = {"n": row.n, "omega": row.omega}
     for kind in KINDS:
         record[f"{kind}_low"], record[f"{kind}_high"] = row.ends(kind)
@@ -175,7 +168,6 @@ def _record(row: ThresholdRow, quality: Quality) -> dict[str, object]:
 
 
 def document(data: Comparison) -> str:
-    """Return the table in Markdown, with the criterion."""
     lines = [
         "# Synchronous ranges of the coupling sigma in chains of n friction oscillators",
         "",

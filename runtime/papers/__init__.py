@@ -18,7 +18,6 @@ __all__ = ["names", "reproduce", "script", "title"]
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of the papers, sorted."""
     return folder.names(__path__)
 
 

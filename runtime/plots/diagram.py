@@ -70,7 +70,6 @@ def _kind(branch: Branch) -> tuple[int, str]:
 
 
 def _states(solution: Equilibrium | PeriodicOrbit) -> list[str]:
-    """Return the names of the states of a solution."""
     slips = () if isinstance(solution, Equilibrium) else ("slip_",)
     return [name for name in solution.scene.equations.state if not name.startswith(slips or "\0")]
 

@@ -47,8 +47,6 @@ class Line:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """A graph that is ready to be drawn."""
-
     positions: np.ndarray  # (n, 2)
     lines: tuple[Line, ...]
     kind: tuple[int, ...]  # kind of each node

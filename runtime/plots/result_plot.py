@@ -137,7 +137,6 @@ def _line_style(x: np.ndarray, name: str) -> dict[str, Any]:
 
 
 def _error(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
-    """Draw the synchronisation error over the axis."""
     x, name = _along(data, result)
     order, error = np.argsort(x, kind="stable"), data.sync_error.values
     axes.plot(x[order], error[order], **line_style(style, color=BLUE, **_line_style(x, name)))
@@ -214,7 +213,6 @@ def _map(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) ->
 
 
 def _time(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
-    """Draw the first state of each node over time."""
     states = node_states(data.trajectory, result, 0)
     _curves(axes, (np.broadcast_to(data.time.values, states.T.shape), states.values.T), style)
     axes.set(xlabel="time", ylabel=symbols(states))

@@ -102,7 +102,6 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
 
 
 def bands(axes: Axes, intervals: Sequence[Interval], *, horizontal: bool = False, **options: Any) -> None:
-    """Draw grey bands over intervals."""
     span = axes.axhspan if horizontal else axes.axvspan
     for low, high in intervals:
         span(low, high, **{"color": GREY, "linewidth": 0.0, "zorder": 0.0, **options})

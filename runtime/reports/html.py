@@ -126,7 +126,6 @@ def _(value: Labelled) -> str:
 
 
 def rows_table(rows: Iterable[tuple[str, str]]) -> str:
-    """Return names and texts as a table."""
     listed = "".join(f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in rows)
     return f"<table>{listed}</table>"
 
@@ -196,7 +195,6 @@ def _oscillators(scene: Scene) -> str:
 
 
 def _records(scene: Scene) -> list[tuple[str, str]]:
-    """Return the rows on records and cells."""
     record = ", ".join(map(str, scene.record)) or "the end of the window only"
     if "section" in scene.record:
         record += f" ({scene.section})"
@@ -240,6 +238,5 @@ def _exact(e: Eigenvalue) -> str:
 
 
 def _shown(e: Eigenvalue) -> str:
-    """Return an eigenvalue as a formula."""
     text = _exact(e)
     return escape(str(e)) if text.startswith("\\text") or len(text) > 300 else formula(text)

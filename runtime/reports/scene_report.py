@@ -45,8 +45,6 @@ POLICY = (
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """Numerical effort of a report."""
-
     strengths: int = 241  # number of strengths of the master stability function
     precision: float | None = None  # as for `synchain.exponents`
     periods: float = 5000.0

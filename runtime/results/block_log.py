@@ -98,7 +98,6 @@ class BlockLog:
 
     @staticmethod
     def create(path: str | os.PathLike[str], about: Description) -> None:
-        """Create a log without blocks."""
         text = json.dumps(about).encode()
         if os.path.exists(path):
             BlockLog.expect_idle(path)
@@ -142,7 +141,6 @@ class BlockLog:
 
     @property
     def done(self) -> np.ndarray:
-        """True for each block (blocks,) that is stored."""
         return self.places >= 0
 
     def append(self, block: int, buffers: Buffers) -> None:
@@ -164,7 +162,6 @@ class BlockLog:
             self.flush()
 
     def flush(self) -> None:
-        """Flush all buffers of the system to the disk."""
         os.fsync(self._file.fileno())
         self._flushed = time.monotonic()
 
@@ -182,7 +179,6 @@ class BlockLog:
         return buffers
 
     def close(self) -> None:
-        """Flush and close the file."""
         if not self._file.closed:
             with suppress(OSError):
                 if self._file.writable():

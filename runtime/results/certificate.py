@@ -53,7 +53,6 @@ class Certificate:
         return np.where((self.exponent + self.margin < 0.0) & rare, NEAR * self.size, 0.0)
 
     def take(self, cells: np.ndarray) -> Certificate:
-        """Return the certificate of some cells."""
         return Certificate(*(getattr(self, part.name)[cells] for part in fields(self)))
 
     def verdicts(self, finished: np.ndarray, error: np.ndarray, largest: np.ndarray) -> np.ndarray:

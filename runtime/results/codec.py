@@ -119,7 +119,6 @@ class _Reader:
         self.data, self.classes, self.scenes = data, classes, scenes
 
     def value(self, tree: Any) -> Any:
-        """Return the value of a part of the tree."""
         if isinstance(tree, list):
             return tuple(map(self.value, tree))
         if not isinstance(tree, dict):

@@ -117,7 +117,6 @@ class States:
 
     @classmethod
     def of(cls, scene: Scene) -> States:
-        """Return the rows and columns of a scene's states."""
         equations = scene.equations
         holders = [equations.holders(name) for name in equations.components]
         rows = np.repeat(np.arange(len(holders)), [len(nodes) for nodes in holders])
@@ -208,7 +207,6 @@ def sample_times(scene: Scene, spans: np.ndarray) -> np.ndarray:
 
 
 def _masks(scene: Scene) -> np.ndarray:
-    """Return the bit of each integrator in `methods`."""
     return 2 ** np.arange(len(method_names(scene)))
 
 
@@ -305,7 +303,6 @@ def labelled(
 
 
 def scene_of(attributes: Mapping[str, Any]) -> Scene:
-    """Return the scene of a result from its attributes."""
     missing = [name for name in TEXTS if not isinstance(attributes.get(name), str)]
     if "scene" in missing:
         raise ValueError("it is no synchain result: it has no attribute 'scene'")

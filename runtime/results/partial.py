@@ -35,7 +35,6 @@ def describe_sweep(
     certificate: Certificate | None,
     part: tuple[int, int] | None = None,
 ) -> Description:
-    """Return the description of a sweep for its block log."""
     merge = reduction.merge
     exponents = None if certificate is None else [getattr(certificate, part.name) for part in fields(certificate)]
     return {
@@ -91,7 +90,6 @@ class _BlockReader:
         self.merge = NodeMerge(states, indices, bool(about["together"]))
 
     def buffers(self, block: int) -> Buffers:
-        """Return the results of a block."""
         return self.merge.expand(self.log.read(block))
 
     def variables(self, cells: np.ndarray, buffers: Buffers) -> Iterator[Variable]:

@@ -135,7 +135,6 @@ class Result(_Deferred, HasAnimation, Labelled):
         return self.data[name]
 
     def _refusal(self, name: object) -> str:
-        """Return the error message for a name that is no variable."""
         names = ", ".join(sorted(map(str, self.data.data_vars)))
         text = f"this result has no {name!r}; it has: {names}"
         method = isinstance(name, str) and not name.startswith("_") and hasattr(xr.Dataset, name)

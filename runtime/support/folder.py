@@ -24,6 +24,5 @@ def check_name(what: str, name: str, path: Iterable[str]) -> None:
 
 
 def load(what: str, name: str, package: str, path: Iterable[str]) -> ModuleType:
-    """Return a module of a package."""
     check_name(what, name, path)
     return import_module(f".{name}", package)

@@ -160,7 +160,6 @@ class Reporter:
         self.advance(int(counts.sum()))
 
     def advance(self, amount: float) -> None:
-        """Add an amount of units that are done."""
         self.done += amount
         if self._bar is not None:
             self._bar.set_postfix_str(self.now.failures, refresh=False)
@@ -178,13 +177,11 @@ class Reporter:
 
     @property
     def now(self) -> Progress:
-        """Return the present progress of the call."""
         statuses = MappingProxyType({s: int(self.counts[s]) for s in Status if self.counts[s]})
         running = time.perf_counter() - self.began
         return Progress(self.total, self.done, self.kept, statuses, self.compiling, running, self.preparing, self.unit)
 
     def close(self) -> None:
-        """End the bar."""
         if self._bar is not None:
             self._bar.close()
 

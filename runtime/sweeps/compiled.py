@@ -189,7 +189,6 @@ class CompiledRun:
         self._sensitivities = Sensitivities.of(scene, planner, gradient) if gradient else None
 
     def __call__(self, **values: Any) -> CompiledResult:
-        """Run the cells of these values."""
         rows, shape = self._rows(values)
         buffers = self._engine(len(rows)).run(self._reduction.rows(rows))
         if not buffers.finished.all() or buffers.counts[:, Count.ACCEPTED].max() > LONG:

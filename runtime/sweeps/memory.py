@@ -73,11 +73,9 @@ class Memory:
         return self.buffers.end[rows], self.buffers.finished[rows]
 
     def put(self, task: Task, buffers: Buffers) -> None:
-        """Copy the cells of a block into the arrays of all cells."""
         self.buffers.put(task.cells, buffers)
 
     def run(self, reporter: Reporter) -> None:
-        """Run the blocks that have not finished."""
         scheduler = BlockScheduler(self.done(), self, self.prepared, reporter)
         reduction = self.prepared.reduction
         try:

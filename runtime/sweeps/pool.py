@@ -105,7 +105,6 @@ class WorkerPool:
         return self.executor.submit(run_block, self.key, self.spec if introduce else None, *task.arguments)
 
     def cancel(self) -> None:
-        """End all cells that run in this process."""
         self.job.cancel()
         forget(self.key)
 

@@ -29,12 +29,10 @@ class PreparedRun:
 
     @property
     def reduction(self) -> ReducedScene:
-        """The reduced scene, which is integrated."""
         return self.job.reduction
 
     @property
     def scene(self) -> Scene:
-        """The scene, with its axes."""
         return self.job.reduction.scene
 
     @property
@@ -57,7 +55,6 @@ def prepare(
     width: int | None = None,
     room: int | None = None,
 ) -> PreparedRun:
-    """Write and compile the kernel of a reduced scene."""
     expect_whole_periods(reduction.planner)
     source = write_kernel(reduction, width)
     warn_of_chords(source)

@@ -58,7 +58,6 @@ class BlockScheduler:
                 yield self._task(block, None if needed is None else self.sink.ends(needed))
 
     def finish(self, task: Task, buffers: Buffers) -> Task | None:
-        """Store a block; return the block that depends on it, or None."""
         self.sink.put(task, buffers)
         if not buffers.ended:
             return None

@@ -335,7 +335,6 @@ class _Disk(Sink):
         return buffers.end, buffers.finished
 
     def put(self, task: Task, buffers: Buffers) -> None:
-        """Append a block of which all cells have ended."""
         if buffers.ended:
             self.log.append(task.block, buffers)
 
