@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 
 from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
-from synchain.models.graphs.products import weighted
+from synchain.models.graphs.graph_products import weighted
 from synchain.models.graphs.topology import Topology
 from synchain.models.interactions.coupling import Rates
 from synchain.models.interactions.ends import ends

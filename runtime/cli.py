@@ -110,7 +110,7 @@ def _dispatch(line: list[str]) -> int:
         return FINE
     arguments.command_line = ("synchain", *line)
     if getattr(arguments, "allow_code", None):
-        from synchain.models.inputs.plugins import allow_code
+        from synchain.models.inputs.plugin_files import allow_code
 
         with wrong_use():
             allow_code(*arguments.allow_code)

@@ -15,7 +15,7 @@ from synchain.models.definitions.definition import COUPLING, OSCILLATOR
 from synchain.models.graphs.families import family
 from synchain.models.graphs.families import names as families
 from synchain.models.inputs.frozen import FrozenDict
-from synchain.models.inputs.plugins import load, names
+from synchain.models.inputs.plugin_files import load, names
 from synchain.models.mechanics.oscillator import Coordinate, FieldModel, LagrangianModel, Oscillator
 
 FUZZ_SECONDS = float(os.environ.get("SYNCHAIN_FUZZ_SECONDS", "0"))

@@ -68,10 +68,10 @@ from synchain.codegen.export.c import to_c  # isort: skip
 from synchain.codegen.export.numba import to_numba
 from synchain.codegen.export.python import to_python
 
-from synchain.models.inputs.plugins import load  # isort: skip
+from synchain.models.inputs.plugin_files import load  # isort: skip
 from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.graphs.families import TOPOLOGY
-from synchain.models.inputs.plugins import names
+from synchain.models.inputs.plugin_files import names
 
 from synchain.models.presentation.equations_text import latex  # isort: skip
 from synchain.models.presentation.equations_text import text

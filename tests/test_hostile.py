@@ -23,7 +23,7 @@ from synchain.models.claims.verdict import verify
 from synchain.models.graphs import readers
 from synchain.models.graphs.families import family, topology
 from synchain.models.graphs.symbolic import weight
-from synchain.models.inputs import plugins
+from synchain.models.inputs import plugin_files
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cli import main
@@ -34,7 +34,7 @@ def law(folder: Path, body: str, name: str = "law.py") -> str:
     head = "from synchain import Lagrangian, Parameter, friction_law, link_energy\n"
     path = folder / name
     path.write_text(head + textwrap.dedent(body))
-    plugins.allow_code(path)
+    plugin_files.allow_code(path)
     return str(path)
 
 

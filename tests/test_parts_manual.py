@@ -9,7 +9,7 @@ import pytest
 
 from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.inputs.arithmetic import constant
-from synchain.models.inputs.plugins import PluginKind, load, names
+from synchain.models.inputs.plugin_files import PluginKind, load, names
 from synchain.models.interactions.coupling import STRENGTH
 from synchain.models.mechanics.contact import KAPPA
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from synchain.models.graphs.families import topology
-from synchain.models.inputs.plugins import allow_code
+from synchain.models.inputs.plugin_files import allow_code
 from synchain.models.scenes.scene import Scene
 
 from .stability_events import events

@@ -12,7 +12,7 @@ from ..program.printers import C99
 from ..program.statements import Array, Do, Statement, called, mentioned
 from .body import is_unrolled, link_jacobian, link_tables, node_jacobian, weights, wrapped
 from .c_functions import in_c
-from .events import EventText, algorithm, has_events, tables
+from .exported_events import EventText, algorithm, has_events, tables
 from .header import Exported
 from .loops import jacobian_statements, mass_statements, rhs_statements
 

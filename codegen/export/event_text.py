@@ -534,8 +534,10 @@ def passage(t: float, h: float, path: Doubles, numbers: Doubles, rows: Doubles) 
 
 
 def run(start: float, stop: float, state: Doubles, numbers: Doubles, rtol: float, atol: float, seen: Seen) -> int:
-    """Move a state from one time to another through all events; return FINISHED, or why not."""
-    # `seen` is called at each event with time, row, mode before and after. Held rows have the mode 0.
+    """Move a state from one time to another through all events; return FINISHED, or why not.
+
+    `seen` is called at each event with time, row, mode before and after.  Held rows have the mode 0.
+    """
     k = np.empty(16 * DIMENSION)
     first = np.empty(DIMENSION)
     end = np.empty(DIMENSION)

@@ -9,7 +9,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.checks import check_number, short_repr, suggestion
 
 from .body import check_inertia
-from .events import without_events
+from .exported_events import without_events
 from .portable_names import portable
 
 SHOWN = 12  # largest number of states that are all listed; of more, only the first and the last are listed

@@ -13,7 +13,7 @@ from ..program.printers import MATH, NUMPY
 from ..program.statements import Array, Return, Statement, called, let
 from .array_statements import entry_tables, jacobian_arrays, mass_arrays, rhs_arrays
 from .body import is_unrolled, wrapped
-from .events import EventText, algorithm_in_lists, has_events, tables
+from .exported_events import EventText, algorithm_in_lists, has_events, tables
 from .header import Exported
 from .loops import jacobian_statements, mass_statements, rhs_statements
 

@@ -6,7 +6,7 @@ A module passes these stages once per process (compilation once per cache folder
 
 1. `_fingerprint` hashes everything that machine code depends on (text, sources of lanes and front end, versions, flags of Numba,
    processor) to the name of the module.
-2. `_module` opens the cache folder (`cache.py`); if it cannot be used, the module is compiled for this process alone.
+2. `_module` opens the cache folder (`code_cache.py`); if it cannot be used, the module is compiled for this process alone.
 3. `_from_folder` loads the machine code, or waits for another process that compiles it, or compiles and stores it.
 4. `_compile` executes the text and compiles its functions for the types of `signatures.py`, or rebuilds them from stored code.
 5. `_kernel` puts the addresses of the functions of a scene into the table that its driver takes (`function_table.py`).
@@ -45,7 +45,7 @@ from ..kernels.kernel_text import KernelSource
 from ..simd import lane_types
 from ..simd.lane_types import has_fma
 from . import function_table
-from .cache import Folder, cache_folder, open_folder
+from .code_cache import Folder, cache_folder, open_folder
 from .function_table import Functions
 from .installation import InstallationError
 from .processor import processor

@@ -28,7 +28,7 @@ from ..graphs.topology import Topology, read_matrix
 from ..inputs.checks import short_repr
 from .cosine_text import cosine_sum
 from .number_text import exact_number, whole_number
-from .parts import LARGEST, WORDS, PartClaim, interval, is_part, read_part
+from .part_claims import LARGEST, WORDS, PartClaim, interval, is_part, read_part
 
 # Largest file in bytes, and most eigenvalues of a line, counted with multiplicity: choices for seconds of work.
 BYTES, REPETITIONS = 1_000_000, 100_000

@@ -19,7 +19,7 @@ from ..spectra.characteristic import characteristic
 from ..spectra.eigenvalue import Eigenvalue, entry, times, words
 from ..spectra.solve import Proof, spectrum
 from .language import Claim, Claimed
-from .parts import verify_parts
+from .part_claims import verify_parts
 
 
 @dataclass(frozen=True, slots=True)

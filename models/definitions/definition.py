@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..inputs.plugins import PluginKind
+from ..inputs.plugin_files import PluginKind
 from ..mechanics.law_plugins import FRICTION_LAW
 
 __all__ = ["COUPLING", "FRICTION_LAW", "OSCILLATOR"]

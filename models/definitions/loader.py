@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..inputs.plugins import load
+from ..inputs.plugin_files import load
 from ..interactions.coupling import Coupling, LagrangianCoupling, MatrixCoupling, split
 from ..mechanics.law_plugins import load_friction_law
 from ..mechanics.oscillator import Oscillator

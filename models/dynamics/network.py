@@ -18,7 +18,7 @@ from ..definitions.definition import FRICTION_LAW
 from ..graphs.hypergraph import Hypergraph
 from ..graphs.links import LINK_LIMIT, AllPairs, Link
 from ..graphs.topology import Topology
-from ..inputs.plugins import names
+from ..inputs.plugin_files import names
 from ..interactions.coupling import Coupling, LagrangianCoupling, MatrixCoupling, Potential
 from ..interactions.link import edge
 from ..interactions.separation import separated

@@ -19,7 +19,7 @@ from ..interactions.link import strength
 from ..mechanics.calculus import derivative, kink_of
 from ..mechanics.components import TIME, Edge, Node
 from ..mechanics.jumps import discontinuity, rough_at
-from ..symmetries.blocks import plus
+from ..symmetries.irreducible import plus
 from .equations import Equations
 from .mode_inertia import effective_slope
 from .reduction import by_class, collapse
@@ -27,8 +27,8 @@ from .saltation import Entry, Events, of_mode, of_network, of_slots
 from .synchrony import expect_no_friction_in_links, synchronous_node
 
 if TYPE_CHECKING:
-    from ..symmetries.blocks import Exact
     from ..symmetries.clusters import Block, Clusters
+    from ..symmetries.irreducible import Exact
 
 MODE = (sp.Symbol("mode_alpha", real=True), sp.Symbol("mode_beta", real=True))
 """Real and imaginary part of the strength of a mode, alpha + i beta = -sigma gamma.

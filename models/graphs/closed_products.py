@@ -1,6 +1,6 @@
 """Closed forms of products and unions of families, with symbols for all sizes.
 
-`products.py` states the rules and the numbering of the nodes.  Each eigenvector of a product is the
+`graph_products.py` states the rules and the numbering of the nodes.  Each eigenvector of a product is the
 Kronecker product of eigenvectors of the factors.
 """
 
@@ -13,7 +13,7 @@ from itertools import product
 
 import sympy as sp
 
-from . import products
+from . import graph_products
 from .closed_forms import NODE, ClosedForm, Term
 from .topology import Topology
 
@@ -24,7 +24,7 @@ def cartesian(first: ClosedForm, second: ClosedForm) -> ClosedForm:
     """Return all sums a + b of eigenvalues of the factors; symbols common to both are renamed in the second."""
     second = _apart(first, second)
     degree = None if first.degree is None or second.degree is None else first.degree + second.degree
-    return _joined(products.cartesian, first, second, _pairs(first, second, lambda a, b: a + b), degree)
+    return _joined(graph_products.cartesian, first, second, _pairs(first, second, lambda a, b: a + b), degree)
 
 
 def kronecker(first: ClosedForm, second: ClosedForm) -> ClosedForm:
@@ -35,7 +35,7 @@ def kronecker(first: ClosedForm, second: ClosedForm) -> ClosedForm:
         odd = first if d is None else second
         raise ValueError(f"kronecker: nodes of {odd.name} differ in their in-degrees; no closed form is known")
     terms = _pairs(first, second, lambda a, b: (a + d) * (b + e) - d * e)
-    return _joined(products.kronecker, first, second, terms, d * e)
+    return _joined(graph_products.kronecker, first, second, terms, d * e)
 
 
 def union(first: ClosedForm, second: ClosedForm) -> ClosedForm:
@@ -51,7 +51,7 @@ def union(first: ClosedForm, second: ClosedForm) -> ClosedForm:
             vector = sp.Piecewise((0, n > NODE), (_at(term, NODE - n), True))
         terms.append(replace(term, vector=vector))
     degree = first.degree if first.degree == second.degree else None
-    return replace(_joined(products.union, first, second, tuple(terms), degree), size=n + second.size)
+    return replace(_joined(graph_products.union, first, second, tuple(terms), degree), size=n + second.size)
 
 
 def box(part: ClosedForm, sizes: Sequence[sp.Expr], indices: Sequence[sp.Symbol]) -> ClosedForm:

@@ -11,9 +11,9 @@ from functools import lru_cache, wraps
 from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from ..inputs import plugins
+from ..inputs import plugin_files
 from ..inputs.options import Options, as_options
-from ..inputs.plugins import PluginKind
+from ..inputs.plugin_files import PluginKind
 from .links import LINK_LIMIT, Link
 from .topology import Topology
 
@@ -239,7 +239,7 @@ class Family:
         except (ValueError, TypeError) as error:
             raise type(error)(f"topology {self.name}: {error}") from None
         except Exception as error:  # a mistake in a plug-in file
-            raise plugins.located(error, self.settle) from error
+            raise plugin_files.located(error, self.settle) from error
         if not isinstance(settled, Mapping):
             raise ValueError(
                 f"topology {self.name}: settle returns {settled!r}; expected a dict of the options; correct its file"
@@ -335,25 +335,25 @@ def topology(name: str, n: int, **options: object) -> Topology:
 
 def names() -> tuple[str, ...]:
     """Return the names of all families, sorted: shipped files and entry points."""
-    return plugins.names(TOPOLOGY)
+    return plugin_files.names(TOPOLOGY)
 
 
 def family(name: str) -> Family:
     """Return a family of graphs by its name, or by a path that `allow_code` has allowed."""
     if not isinstance(name, str):
         raise TypeError(f"topology name {name!r} is no text; expected one of {', '.join(names())}")
-    canonical = plugins.named(TOPOLOGY, name)
-    loaded: Family = plugins.load(TOPOLOGY, canonical)
-    if plugins.is_shipped(TOPOLOGY, canonical):
+    canonical = plugin_files.named(TOPOLOGY, name)
+    loaded: Family = plugin_files.load(TOPOLOGY, canonical)
+    if plugin_files.is_shipped(TOPOLOGY, canonical):
         return loaded
 
     # Wrap the functions of a plug-in file: errors name file and line, and returned values are checked.
     def blamed(function: Callable[..., Any] | None) -> Callable[..., Any] | None:
-        return None if function is None else plugins.blamed(function)(function)
+        return None if function is None else plugin_files.blamed(function)(function)
 
     @wraps(loaded.edges)
     def edges(n: int, **options: object) -> Iterator[tuple[int, int, Fraction]]:
-        with plugins.blamed(loaded.edges):
+        with plugin_files.blamed(loaded.edges):
             yield from ((i, j, Fraction(weight)) for i, j, weight in loaded.edges(n, **options))
 
     guarded = replace(loaded, edges=edges, count=blamed(loaded.count), expected=blamed(loaded.expected))
@@ -362,7 +362,7 @@ def family(name: str) -> Family:
 
     @wraps(spectrum)
     def checked(n: int, **options: object) -> Eigenvalues:
-        with plugins.blamed(spectrum):
+        with plugin_files.blamed(spectrum):
             pairs: Eigenvalues = spectrum(n, **options)
         for pair in () if pairs is None else pairs if isinstance(pairs, Sequence) else (pairs,):
             if not (isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[1], int) and pair[1] > 0):

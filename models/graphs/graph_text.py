@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar, NoReturn, TypeVar
 
 from ..inputs.checks import short_repr
 from ..inputs.reader import Algebra, NoMeaning, parse, unpaired
-from . import products
+from . import graph_products
 from .families import TOPOLOGY, family, names, topology
 from .topology import Topology
 
@@ -118,12 +118,12 @@ class _Graphs(_Composed[Topology]):
         match function, arguments:
             case "cartesian" | "kronecker" | "union", [Topology() as first, Topology() as second]:
                 self._check_size(first.n + second.n if function == "union" else first.n * second.n)
-                operation: Callable[[Topology, Topology], Topology] = getattr(products, function)
+                operation: Callable[[Topology, Topology], Topology] = getattr(graph_products, function)
                 return operation(first, second)
             case "complement", [Topology() as graph]:
-                return products.complement(graph)
+                return graph_products.complement(graph)
             case "weighted", [Topology() as graph, str() as factor]:
-                return products.weighted(graph, factor)
+                return graph_products.weighted(graph, factor)
             case _, [str() as size] if size[:1].isdigit():
                 try:
                     n = int(size, 0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..inputs.plugins import PluginKind, load
+from ..inputs.plugin_files import PluginKind, load
 
 if TYPE_CHECKING:
     from .contact import FrictionLaw

@@ -12,7 +12,7 @@ from ..graphs.families import topology
 from ..graphs.graph_text import checked_name
 from ..graphs.topology import Topology
 from ..inputs.checks import check_integer, check_keys, check_table, short_repr
-from ..inputs.plugins import part
+from ..inputs.plugin_files import part
 from ..interactions.coupling import COUPLINGS, Coupling
 from ..mechanics.contact import ContactModel, FrictionLaw
 from ..mechanics.oscillator import Oscillator

@@ -27,7 +27,7 @@ from ..networks.layers import as_contact, as_coupling, as_groups, as_law, as_lay
 from ..networks.model import Model, NodeKind
 from ..sweeps.axis import LIMIT, Axis
 from ..sweeps.checked_axes import check_cells, check_draws, check_sweep, read_axes
-from ..sweeps.draw import GRAPH, Draws, drawn_axes, drawn_graph, drawn_nodes, draws
+from ..sweeps.draws import GRAPH, Draws, drawn_axes, drawn_graph, drawn_nodes, draws
 from ..sweeps.initial_values import SEED_LIMIT, chosen_start, default_start
 from ..sweeps.parameters import at_links, at_nodes, drive, parameters, varied
 from .observables import ENDINGS, observables, sections, stop

@@ -15,11 +15,11 @@ from ..graphs.hypergraph import Hypergraph, triangles
 from ..graphs.readers import edge_graph
 from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import check_integer, check_keys, check_table, check_text, short_repr
-from ..inputs.plugins import part
+from ..inputs.plugin_files import part
 from ..interactions.coupling import split
 from ..networks.model import MOST_NODES
 from ..sweeps.distribution import Draw
-from ..sweeps.draw import GRAPH, Draws, Graphs, RandomGraph
+from ..sweeps.draws import GRAPH, Draws, Graphs, RandomGraph
 from ..sweeps.parameters import collected
 
 

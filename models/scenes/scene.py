@@ -29,7 +29,7 @@ from ..networks.layers import as_topology
 from ..networks.model import Group, Model
 from ..sweeps.axis import Axis
 from ..sweeps.checked_axes import Continuation
-from ..sweeps.draw import GRAPH, Draws, drawn_axes
+from ..sweeps.draws import GRAPH, Draws, drawn_axes
 from ..sweeps.parameters import drive, varied, without
 from .defaults import MODEL_KEYWORDS, TimeUnit, complete, model_of
 from .dictionary import arguments, as_dict

@@ -12,14 +12,14 @@ from ..definitions.inline import LONGEST_SOURCE
 from ..definitions.loader import load_friction_law, load_oscillator, read_coupling
 from ..graphs.families import Family, family
 from ..graphs.families import names as families
-from ..inputs import plugins
-from ..inputs.plugins import PluginKind
+from ..inputs import plugin_files
+from ..inputs.plugin_files import PluginKind
 from ..inputs.words import Word
 from ..mechanics.contact import KAPPA, ContactModel
 from ..mechanics.parameter import Parameter
 from ..networks.model import MOST_NODES
 from ..sweeps.axis import LIMIT as AXIS_LIMIT
-from ..sweeps.draw import GRAPH
+from ..sweeps.draws import GRAPH
 from .defaults import LIMITS, integrators
 from .scene import KEYWORDS, Scene
 from .section import Direction
@@ -158,7 +158,7 @@ def _either(*others: Table) -> Table:
 
 def _part(kind: PluginKind, *words: str) -> Table:
     """Return the row of the name of a part, of a file outside the package, or of some words."""
-    return {"anyOf": [{"enum": [*plugins.names(kind), *words]}, FILE]}
+    return {"anyOf": [{"enum": [*plugin_files.names(kind), *words]}, FILE]}
 
 
 def _written_out() -> tuple[Table, Table, Table]:
@@ -225,9 +225,9 @@ def _family(graphs: Family) -> Table:
 def _parameters() -> dict[str, str]:
     """Return the meanings of each parameter in all oscillators, laws and couplings that have a parameter of the name."""
     parts: dict[str, Mapping[str, Parameter]] = {
-        **{name: load_oscillator(name).parameters for name in plugins.names(OSCILLATOR)},
-        **{f"friction {name}": load_friction_law(name).parameters for name in plugins.names(FRICTION_LAW)},
-        **{f"coupling {name}": read_coupling(name).parameters for name in plugins.names(COUPLING)},
+        **{name: load_oscillator(name).parameters for name in plugin_files.names(OSCILLATOR)},
+        **{f"friction {name}": load_friction_law(name).parameters for name in plugin_files.names(FRICTION_LAW)},
+        **{f"coupling {name}": read_coupling(name).parameters for name in plugin_files.names(COUPLING)},
         "contact atan": {"kappa": KAPPA},
     }
     meanings: dict[str, list[str]] = {}

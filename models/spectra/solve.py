@@ -23,7 +23,7 @@ from ..algebra.cosines import written
 from ..algebra.lazy import LazyEigenvalues
 from ..algebra.minimal_polynomials import minimal_polynomial, monic
 from ..algebra.roots import Root, roots
-from ..inputs.plugins import OwnFile
+from ..inputs.plugin_files import OwnFile
 from .characteristic import characteristic
 from .eigenvalue import Eigenvalue, Number, ProofError, distinct, ordered
 from .jordan import blocks

@@ -26,7 +26,7 @@ from ..graphs.readers import as_topology
 from ..graphs.topology import Topology
 from ..inputs.checks import typed_repr
 from .automorphisms import automorphisms
-from .blocks import Generator, Rows, irreducible_subspaces
+from .irreducible import Generator, Rows, irreducible_subspaces
 from .partitions import class_links
 
 NODE_LIMIT = 64  # most nodes of a graph whose symmetries are searched, a choice

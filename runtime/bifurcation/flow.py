@@ -31,8 +31,8 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.drive_times import longest_steps, periods
 from ..cells.initial_modes import with_modes
+from ..cells.initial_row_modes import row_modes
 from ..cells.plan import FIRST_STEP, CellRows
-from ..cells.row_modes import row_modes
 from ..engines.choice import chosen_for_modes, chosen_for_rows
 from ..engines.job import JobSpec, RowsJob, RowsSpec
 from ..engines.step_control import control_array

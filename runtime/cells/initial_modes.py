@@ -11,7 +11,7 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
-from .row_modes import row_modes
+from .initial_row_modes import row_modes
 
 CLOCK = 8.0  # period of the clock of an oscillator without a drive: a power of two, so that no digit is lost
 

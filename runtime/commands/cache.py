@@ -35,7 +35,7 @@ def execute(arguments: Namespace) -> int:
                 raise Failed(f"drivers are not kept on disk: {shared.problem}")
             print(f"{'was there' if shared.from_cache else 'compiled':9}  {common}", flush=True)
         return FINE
-    from synchain.codegen.machine_code.cache import clear, describe
+    from synchain.codegen.machine_code.code_cache import clear, describe
 
     try:
         info = describe()

@@ -108,7 +108,7 @@ def _packages() -> Answer:
 
 
 def _cache() -> Answer:
-    from synchain.codegen.machine_code.cache import cache_folder, describe, open_folder
+    from synchain.codegen.machine_code.code_cache import cache_folder, describe, open_folder
 
     try:
         with open_folder(cache_folder()) as opened:

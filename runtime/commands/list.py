@@ -34,12 +34,12 @@ def execute(arguments: Namespace) -> int:
 def _parts(kind: str) -> list[Row]:
     """Return the plug-ins of a kind: those of the package and of installed ones."""
     from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
-    from synchain.models.inputs import plugins
+    from synchain.models.inputs import plugin_files
 
     of_kind = {"oscillators": OSCILLATOR, "couplings": COUPLING, "frictions": FRICTION_LAW}[kind]
     rows: list[Row] = []
-    for name in plugins.names(of_kind):
-        part = plugins.load(of_kind, name)
+    for name in plugin_files.names(of_kind):
+        part = plugin_files.load(of_kind, name)
         # Rates and potentials of links that other packages offer have no summary.
         parameters = {key: each.default for key, each in getattr(part, "parameters", {}).items()}
         rows.append({"name": name, "summary": getattr(part, "summary", ""), "parameters": parameters})

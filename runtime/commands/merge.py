@@ -26,7 +26,7 @@ def execute(arguments: Namespace) -> int:
     from pathlib import Path
 
     from ..support.files import output_folder
-    from ..sweeps.merge import merge
+    from ..sweeps.merge_parts import merge
     from .run import print_run
 
     with wrong_use():

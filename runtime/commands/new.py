@@ -74,9 +74,9 @@ def _check(kind: str, name: str) -> None:
         )
     from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
     from synchain.models.graphs.families import TOPOLOGY
-    from synchain.models.inputs import plugins
+    from synchain.models.inputs import plugin_files
 
     plugin_kind = {each.name: each for each in (TOPOLOGY, OSCILLATOR, FRICTION_LAW, COUPLING)}[kind]
-    names = plugins.names(plugin_kind)
+    names = plugin_files.names(plugin_kind)
     if name in {*names, *plugin_kind.also}:
         raise WrongUse(f"{kind} {name!r} exists already; choose another name; known: {', '.join(names)}")

@@ -23,7 +23,7 @@ from synchain.codegen.machine_code.compile import Kernel, load
 from synchain.codegen.machine_code.installation import InstallationError
 from synchain.codegen.machine_code.processor import processor, told_apart
 from synchain.models.dynamics.equations import Equations
-from synchain.models.inputs.plugins import allow_code, allowed_code
+from synchain.models.inputs.plugin_files import allow_code, allowed_code
 
 from ..cells.buffers import Buffers
 from ..cells.paces import Templates

@@ -62,7 +62,7 @@ HOMES = {
     "load_oscillator": "models.definitions.loader",
     "load_scene": "models.scenes.file",
     "lyapunov_spectrum": "runtime.stability.lyapunov",
-    "merge": "runtime.sweeps.merge",
+    "merge": "runtime.sweeps.merge_parts",
     "mismatch": "runtime.synchronisation.mismatch",
     "msf": "runtime.stability.msf",
     "open_result": "runtime.results.open",

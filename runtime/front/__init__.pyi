@@ -40,7 +40,7 @@ from synchain.runtime.stability.lyapunov import lyapunov_spectrum as lyapunov_sp
 from synchain.runtime.stability.msf import msf as msf
 from synchain.runtime.stability.msf import plane as plane
 from synchain.runtime.sweeps.compiled import compile as compile
-from synchain.runtime.sweeps.merge import merge as merge
+from synchain.runtime.sweeps.merge_parts import merge as merge
 from synchain.runtime.sweeps.run import run as run
 from synchain.runtime.sweeps.stream import stream as stream
 from synchain.runtime.sweeps.work_precision import work_precision as work_precision

@@ -8,7 +8,7 @@ HOMES = {
     "Family": "models.graphs.families",
     "FrictionLaw": "models.mechanics.contact",
     "Oscillator": "models.mechanics.oscillator",
-    "allow_code": "models.inputs.plugins",
+    "allow_code": "models.inputs.plugin_files",
     "integer_option": "models.inputs.options",
     "integers_option": "models.inputs.options",
     "probability_option": "models.inputs.options",

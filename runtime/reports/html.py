@@ -25,7 +25,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.models.spectra.eigenvalue import Eigenvalue, decimal
 from synchain.models.spectra.spectrum import Spectrum
 from synchain.models.sweeps.distribution import Draw
-from synchain.models.sweeps.draw import RandomGraph
+from synchain.models.sweeps.draws import RandomGraph
 
 from ..plots.graph_picture import svg
 from ..results.labelled import Labelled

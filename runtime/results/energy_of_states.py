@@ -26,7 +26,7 @@ Values = Mapping[str, float] | None
 
 
 @dataclass(frozen=True, slots=True)
-class _Group:
+class _Members:
     """The `count` nodes or links of one kind."""
 
     formulas: tuple[Formula, Formula]  # energy and power as functions of (t or weight, states, parameters)
@@ -52,7 +52,7 @@ class EnergyFunction:
 
     scene: Scene
     exact: EnergyTerms
-    groups: tuple[_Group, ...]
+    groups: tuple[_Members, ...]
 
     def __call__(self, states: Array, t: Array | float = 0.0, parameters: Values = None) -> Array:
         """Return the energy (…) of the states at times (…) or at one time."""
@@ -111,7 +111,7 @@ def energy_function(scene: Scene) -> EnergyFunction:
         members = [i for i, k in enumerate(equations.kind_of) if k == kind]
         states = list(np.array([places[i] for i in members]).T)
         names = _names(equations, node.parameters, members)
-        groups.append(_Group(_compiled(share, (TIME, *node.state, *node.parameters)), None, states, names))
+        groups.append(_Members(_compiled(share, (TIME, *node.state, *node.parameters)), None, states, names))
     for kind, (share, edge) in enumerate(zip(exact.links, equations.edges, strict=True)):
         pairs = [pair for pair, number in exact.pairs if number == kind]  # (target, source, weight)
         if pairs:
@@ -124,7 +124,7 @@ def energy_function(scene: Scene) -> EnergyFunction:
                 if s.name in equations.numbered:
                     names[k] = [equations.numbered[s.name].name(s.name, pair) for pair in pairs]
             formulas = _compiled(share, (edge.weight, *edge.here, *edge.there, *edge.parameters, *renamed))
-            groups.append(_Group(formulas, np.array([float(pair[2]) for pair in pairs]), states, names))
+            groups.append(_Members(formulas, np.array([float(pair[2]) for pair in pairs]), states, names))
     return EnergyFunction(scene, exact, tuple(groups))
 
 

@@ -28,7 +28,7 @@ from synchain.codegen.program.lowering import Library, number
 from synchain.codegen.program.printers import C99, MATH, NUMPY, Printer
 from synchain.graphs import chain, ring, star
 from synchain.models.dynamics.equations import Equations
-from synchain.models.graphs.products import weighted
+from synchain.models.graphs.graph_products import weighted
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.scenes.scene import Scene

@@ -17,7 +17,7 @@ from scipy.linalg import expm
 from synchain import Field, Rates, Scene, run
 from synchain.codegen import integrators
 from synchain.codegen.front_end import decorator
-from synchain.codegen.machine_code.cache import cache_folder
+from synchain.codegen.machine_code.code_cache import cache_folder
 from synchain.graphs import chain
 from synchain.runtime.support.status import Status
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from synchain.codegen.machine_code import cache
+from synchain.codegen.machine_code import code_cache
 
 
 @pytest.fixture
@@ -22,27 +22,27 @@ def test_where_kernels_are_kept(monkeypatch, tmp_path):
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.delenv("SYNCHAIN_CACHE", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert cache.cache_folder() == tmp_path / "synchain"
+    assert code_cache.cache_folder() == tmp_path / "synchain"
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path))
-    assert cache.cache_folder() == tmp_path / ".cache" / "synchain"
+    assert code_cache.cache_folder() == tmp_path / ".cache" / "synchain"
     monkeypatch.setattr(sys, "platform", "darwin")
-    assert cache.cache_folder() == tmp_path / "Library" / "Caches" / "synchain"
+    assert code_cache.cache_folder() == tmp_path / "Library" / "Caches" / "synchain"
     monkeypatch.setattr(sys, "platform", "win32")
     monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "local"))
-    assert cache.cache_folder() == tmp_path / "local" / "synchain"
+    assert code_cache.cache_folder() == tmp_path / "local" / "synchain"
     monkeypatch.setenv("SYNCHAIN_CACHE", "~/mine")
-    assert cache.cache_folder() == tmp_path / "mine"
+    assert code_cache.cache_folder() == tmp_path / "mine"
 
 
 def test_a_new_folder_belongs_to_its_user_alone(folder):
-    with cache.open_folder(folder):
+    with code_cache.open_folder(folder):
         assert stat.S_IMODE(folder.stat().st_mode) == 0o700
 
 
 def test_clearing_leaves_other_files_alone(folder):
-    assert cache.describe() == {"folder": str(folder), "kernels": 0, "drivers": 0, "bytes": 0}
-    assert cache.clear() == {"kernels": 0, "drivers": 0}
+    assert code_cache.describe() == {"folder": str(folder), "kernels": 0, "drivers": 0, "bytes": 0}
+    assert code_cache.clear() == {"kernels": 0, "drivers": 0}
     (folder / "__pycache__").mkdir(parents=True)
     for name, text in (
         ("kernel_a.py", "12"),
@@ -56,6 +56,6 @@ def test_clearing_leaves_other_files_alone(folder):
         ("notes.txt", ""),
     ):
         (folder / name).write_text(text)
-    assert cache.describe() == {"folder": str(folder), "kernels": 2, "drivers": 1, "bytes": 13}
-    assert cache.clear() == {"kernels": 2, "drivers": 1}
+    assert code_cache.describe() == {"folder": str(folder), "kernels": 2, "drivers": 1, "bytes": 13}
+    assert code_cache.clear() == {"kernels": 2, "drivers": 1}
     assert [p.name for p in folder.iterdir()] == ["notes.txt"]

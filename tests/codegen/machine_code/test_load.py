@@ -35,7 +35,7 @@ from synchain.codegen.kernels.driver import Driver, KernelKind
 from synchain.codegen.kernels.mode_kernel import emit_modes
 from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
-from synchain.codegen.machine_code import cache
+from synchain.codegen.machine_code import code_cache
 from synchain.codegen.machine_code import compile as loading
 from synchain.codegen.simd import lane_types, lanes
 from synchain.models.dynamics.equations import Equations
@@ -104,7 +104,7 @@ for line in sys.stdin:
 HOLDER = """
 import sys, time
 from pathlib import Path
-from synchain.codegen.machine_code.cache import open_folder
+from synchain.codegen.machine_code.code_cache import open_folder
 with open_folder(Path(sys.argv[1])) as folder, folder.locked(sys.argv[2]):
     print("held", flush=True)
     time.sleep(600)
@@ -215,7 +215,7 @@ def folder(tmp_path, monkeypatch) -> Path:
 def fresh(source=SOURCE):
     """Load without what this process remembers."""
     loading.forget()
-    cache._warned_folders.clear()
+    code_cache._warned_folders.clear()
     return loading.load(source)
 
 
@@ -451,7 +451,7 @@ def test_the_common_drivers_compile(folder, capsys):
         loading.forget()
         assert main(["cache", "warm"]) == 0
         assert [line.startswith(word) for line in capsys.readouterr().out.splitlines()] == [True] * 21
-    assert cache.describe()["drivers"] == 21
+    assert code_cache.describe()["drivers"] == 21
 
 
 # -- the front end and forks ----------------------------------------------------------------------------------
@@ -665,10 +665,10 @@ def test_another_processor_compiles_its_own(compiled_folder, folder, monkeypatch
 
 
 def test_a_full_disk_is_no_problem(folder, monkeypatch):
-    def full(opened: cache.Folder, name: str, data: bytes) -> None:
+    def full(opened: code_cache.Folder, name: str, data: bytes) -> None:
         raise OSError(errno.ENOSPC, "No space left on device", name)
 
-    monkeypatch.setattr(cache.Folder, "write", full)
+    monkeypatch.setattr(code_cache.Folder, "write", full)
     warned("No space left on device")
 
 
@@ -713,7 +713,7 @@ def repaired(match: str):
 
 def refused(match: str) -> None:
     """The cache folder cannot be opened; `warned` is what a kernel makes of it."""
-    with pytest.raises(OSError, match=match), cache.open_folder(cache.cache_folder()):
+    with pytest.raises(OSError, match=match), code_cache.open_folder(code_cache.cache_folder()):
         pass
 
 
@@ -745,7 +745,7 @@ def test_a_folder_that_others_can_replace_is_refused(mode, tmp_path, monkeypatch
     monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path / "open" / "inner" / "kernels"))
     refused("which others can write; run: chmod go-w")
     (tmp_path / "open").chmod(0o1777)
-    with cache.open_folder(cache.cache_folder()):
+    with code_cache.open_folder(code_cache.cache_folder()):
         pass
 
 
@@ -764,10 +764,10 @@ def test_a_folder_in_the_folder_of_another_user_is_refused(tmp_path, monkeypatch
 @posix
 def test_another_folder_in_the_place_of_an_open_one_is_not_read(tmp_path):
     """A swap between the check of a folder and the reading of its files changes nothing."""
-    with cache.open_folder(tmp_path / "kernels") as opened:
+    with code_cache.open_folder(tmp_path / "kernels") as opened:
         opened.store_code("kernel_a", b"mine")
         (tmp_path / "kernels").rename(tmp_path / "aside")
-        with cache.open_folder(tmp_path / "kernels") as evil:
+        with code_cache.open_folder(tmp_path / "kernels") as evil:
             evil.store_code("kernel_a", b"theirs")
         assert opened.load_code("kernel_a") == b"mine"
         opened.write("kernel_b.py", b"b")
@@ -778,7 +778,7 @@ def test_another_folder_in_the_place_of_an_open_one_is_not_read(tmp_path):
 def test_missing_parents_are_made_for_the_user_alone(tmp_path, monkeypatch):
     before = os.umask(0o002)
     try:
-        with cache.open_folder(tmp_path / "a" / "b" / "kernels"):
+        with code_cache.open_folder(tmp_path / "a" / "b" / "kernels"):
             assert stat.S_IMODE((tmp_path / "a").stat().st_mode) == 0o700
     finally:
         os.umask(before)
@@ -854,15 +854,15 @@ def test_machine_code_that_another_key_signed_is_not_run(compiled_folder, folder
     assert len(caught) == 1
     assert from_cache(compiled) == dict.fromkeys(MODULES, False)
     assert from_cache(fresh()) == ALL_FROM_CACHE
-    key = settings / cache.KEY
+    key = settings / code_cache.KEY
     assert (len(key.read_bytes()), stat.S_IMODE(key.stat().st_mode)) == (32, 0o600)
-    assert [path.name for path in settings.iterdir()] == [cache.KEY]
+    assert [path.name for path in settings.iterdir()] == [code_cache.KEY]
 
 
 def test_processes_that_make_a_key_at_once_agree(folder, settings, monkeypatch):
     """The second writes its own after the first has looked for one."""
-    with cache.open_folder(settings) as one, cache.open_folder(settings) as two:
-        write, first = cache.Folder.write, []
+    with code_cache.open_folder(settings) as one, code_cache.open_folder(settings) as two:
+        write, first = code_cache.Folder.write, []
 
         def slow(opened, name, data):
             if not first:
@@ -870,20 +870,20 @@ def test_processes_that_make_a_key_at_once_agree(folder, settings, monkeypatch):
                 first[0] = two.key_here()
             write(opened, name, data)
 
-        monkeypatch.setattr(cache.Folder, "write", slow)
+        monkeypatch.setattr(code_cache.Folder, "write", slow)
         assert one.key_here() == first[0] == two.key_here()
 
 
 def test_without_settings_the_key_lies_in_the_cache(folder, settings):
     settings.parent.write_text("no folder")
-    with cache.open_folder(folder) as opened:
+    with code_cache.open_folder(folder) as opened:
         opened.store_code("kernel_a", b"code")
         assert opened.load_code("kernel_a") == b"code"
-        assert (folder / cache.KEY).read_bytes() == opened.key()
+        assert (folder / code_cache.KEY).read_bytes() == opened.key()
 
 
 def test_a_folder_of_somebody_else_is_refused(folder, monkeypatch):
-    monkeypatch.setattr(cache.os, "getuid", lambda: 4711, raising=False)
+    monkeypatch.setattr(code_cache.os, "getuid", lambda: 4711, raising=False)
     refused("belongs to another user; set SYNCHAIN_CACHE to a folder of yours")
 
 

@@ -16,9 +16,9 @@ from effort import effort
 from synchain.graphs import chain, feed_forward, ring, star
 from synchain.models.algebra.cosine_sums import AngleSum
 from synchain.models.algebra.equality import sign
-from synchain.models.claims.parts import interval, read_part
+from synchain.models.claims.part_claims import interval, read_part
 from synchain.models.graphs.families import topology
-from synchain.models.graphs.products import cartesian, factors
+from synchain.models.graphs.graph_products import cartesian, factors
 from synchain.runtime.cli import main
 
 RIGHT = [

@@ -13,7 +13,7 @@ from synchain import Friction, Lagrangian, Potential, Rates, Reset, Scene, Stop,
 from synchain.codegen.driver.columns import SpanColumn
 from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
-from synchain.models.inputs.plugins import allow_code
+from synchain.models.inputs.plugin_files import allow_code
 from synchain.models.mechanics.components import TIME
 from synchain.runtime.bifurcation.branches import follow
 from synchain.runtime.bifurcation.periodic import periodic_orbit

@@ -17,7 +17,7 @@ from synchain.models.definitions.definition import FRICTION_LAW, OSCILLATOR
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import network
 from synchain.models.graphs.families import names as families
-from synchain.models.inputs.plugins import names
+from synchain.models.inputs.plugin_files import names
 from synchain.models.interactions.coupling import Coupling
 from synchain.models.mechanics.components import TIME, Node
 from synchain.models.mechanics.contact import ContactModel

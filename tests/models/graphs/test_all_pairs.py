@@ -7,8 +7,8 @@ from fractions import Fraction
 import pytest
 
 from synchain.models.graphs.families import family, names, topology
+from synchain.models.graphs.graph_products import complement, union, weighted
 from synchain.models.graphs.links import LINK_LIMIT, AllPairs
-from synchain.models.graphs.products import complement, union, weighted
 from synchain.models.graphs.topology import Topology
 
 MILLION = 10**6

@@ -19,8 +19,8 @@ from synchain.models.claims.language import Claim, Claimed
 from synchain.models.claims.verdict import verify
 from synchain.models.graphs.closed_forms import NODE, ClosedForm, Term, closed_form, formulas
 from synchain.models.graphs.families import topology
+from synchain.models.graphs.graph_products import cartesian, complement, kronecker, union, weighted
 from synchain.models.graphs.graph_text import is_composed, read_form, read_graph
-from synchain.models.graphs.products import cartesian, complement, kronecker, union, weighted
 from synchain.models.graphs.topology import Topology
 from synchain.runtime.cli import main
 

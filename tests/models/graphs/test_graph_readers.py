@@ -14,7 +14,7 @@ import scipy.sparse
 import sympy as sp
 
 from synchain.models.graphs.families import topology
-from synchain.models.graphs.products import cartesian, complement, weighted
+from synchain.models.graphs.graph_products import cartesian, complement, weighted
 from synchain.models.graphs.readers import as_topology, from_edges, from_graph, from_sparse, read_edges, read_graphml
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.inputs.rational_text import FILE_LIMIT

@@ -13,8 +13,8 @@ from family_sizes import size
 
 from synchain.models.graphs import matrices
 from synchain.models.graphs.families import family, names, topology
+from synchain.models.graphs.graph_products import union, weighted
 from synchain.models.graphs.matrices import GraphMatrix, MatrixKind
-from synchain.models.graphs.products import union, weighted
 from synchain.models.graphs.readers import from_edges
 from synchain.models.graphs.topology import Topology
 from synchain.models.spectra.eigenvalue import ProofError

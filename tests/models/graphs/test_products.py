@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from synchain.models.algebra.cosine_sums import AngleSum, expression, merged, minimal_polynomial, read
 from synchain.models.graphs.families import topology
-from synchain.models.graphs.products import cartesian, complement, kronecker, union, weighted
+from synchain.models.graphs.graph_products import cartesian, complement, kronecker, union, weighted
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.spectra.solve import Proof, spectrum
 

@@ -22,7 +22,7 @@ from parts import node
 from synchain.graphs import chain
 from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.graphs.families import TOPOLOGY, names, topology
-from synchain.models.inputs import plugins
+from synchain.models.inputs import plugin_files
 from synchain.models.mechanics.contact import ContactModel
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
@@ -63,9 +63,9 @@ def test_the_starting_files_conform(placed: str) -> None:
 
 def test_a_file_of_ones_own_comes_before_the_other_name_of_another(placed: str) -> None:
     kind = replace(TOPOLOGY, also={placed: "ring", "loop": "ring", "elsewhere": placed})
-    assert plugins.named(kind, placed) == placed
-    assert plugins.named(kind, "loop") == "ring"
-    assert plugins.load(kind, "elsewhere") is plugins.load(TOPOLOGY, placed)
+    assert plugin_files.named(kind, placed) == placed
+    assert plugin_files.named(kind, "loop") == "ring"
+    assert plugin_files.load(kind, "elsewhere") is plugin_files.load(TOPOLOGY, placed)
 
 
 def test_the_starting_files_work_together(placed: str) -> None:
@@ -137,12 +137,12 @@ def test_a_path_is_run_only_where_it_is_allowed(law: Path) -> None:
 
 
 def test_an_allowed_path_is_a_name(law: Path) -> None:
-    plugins.allow_code(law)
+    plugin_files.allow_code(law)
     scene = Scene(friction=str(law), topology=chain(2))
     assert scene.parameters["mu_0"] == 0.3
     assert Scene.from_dict(scene.as_dict()) == scene
     with pytest.raises(ValueError, match="no file that ends in"):
-        plugins.allow_code("none.py")
+        plugin_files.allow_code("none.py")
 
 
 def test_a_scene_file_runs_code_only_with_the_option(law: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -180,7 +180,7 @@ def test_a_scene_file_runs_code_only_with_the_option(law: Path, capsys: pytest.C
 )
 def test_an_error_names_file_and_line(law: Path, old: str, new: str, message: str) -> None:
     law.write_text(law.read_text("utf-8").replace(old, new), encoding="utf-8")
-    plugins.allow_code(law)
+    plugin_files.allow_code(law)
     with pytest.raises(ValueError, match=message) as caught:
         _ = Scene(friction=str(law)).equations
     assert "my_law" in str(caught.value)
@@ -215,16 +215,16 @@ def test_entry_points_are_plug_ins(law: Path, installed: Callable[[dict[str, str
     }
     entries = "from_elsewhere = elsewhere_law\nbroken = elsewhere_broken\nempty = elsewhere_empty:part\n"
     installed(modules, f"[synchain.frictions]\n{entries}")
-    assert "from_elsewhere" in plugins.names(FRICTION_LAW)
-    assert plugins.load(FRICTION_LAW, "from_elsewhere") == replace(
+    assert "from_elsewhere" in plugin_files.names(FRICTION_LAW)
+    assert plugin_files.load(FRICTION_LAW, "from_elsewhere") == replace(
         sys.modules["elsewhere_law"].FRICTION, name="from_elsewhere"
     )
     with pytest.raises(ValueError, match=r"elsewhere_broken.*elsewhere_broken.py, line 1: RuntimeError: out of order"):
-        plugins.load(FRICTION_LAW, "broken")
+        plugin_files.load(FRICTION_LAW, "broken")
     with pytest.raises(ValueError, match="found no module"):
-        plugins.load(FRICTION_LAW, "empty")
+        plugin_files.load(FRICTION_LAW, "empty")
     with pytest.raises(ValueError, match="unknown friction 'nope'; known: broken, coulomb"):
-        plugins.load(FRICTION_LAW, "nope")
+        plugin_files.load(FRICTION_LAW, "nope")
 
 
 def test_topologies_from_outside(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -245,11 +245,11 @@ def test_topologies_from_outside(tmp_path: Path, capsys: pytest.CaptureFixture[s
     wrong.write_text(
         "from synchain.plugins import Family\ndef edges(n):\n    yield 0, 1, 1 / (n - n)\nTOPOLOGY = Family(edges, 1)\n"
     )
-    plugins.allow_code(wrong)
+    plugin_files.allow_code(wrong)
     with pytest.raises(ValueError, match=r"wrong.py, line 3: ZeroDivisionError"):
         _ = topology(str(wrong), 3).links
     wrong.with_name("none.py").write_text("MINIMUM = 1\n", encoding="utf-8")
-    plugins.allow_code(wrong.with_name("none.py"))
+    plugin_files.allow_code(wrong.with_name("none.py"))
     with pytest.raises(
         ValueError, match=r"none.py: found no TOPOLOGY; expected TOPOLOGY = Family\(edges, minimum=…\);"
     ):
@@ -273,8 +273,8 @@ def test_the_groups_of_entry_points_are_read(monkeypatch: pytest.MonkeyPatch) ->
     asked = []
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: asked.append(group) or [])
     monkeypatch.syspath_prepend("another place")
-    plugins.names(OSCILLATOR)
-    plugins.names(TOPOLOGY)
+    plugin_files.names(OSCILLATOR)
+    plugin_files.names(TOPOLOGY)
     assert asked == ["synchain.oscillators", "synchain.topologies"]
 
 
@@ -291,7 +291,7 @@ def written(path: Path, text: str) -> str:
     """The path of a file with this text, allowed to run."""
     path.parent.mkdir(exist_ok=True)
     path.write_text(HEAD + text, encoding="utf-8")
-    plugins.allow_code(path)
+    plugin_files.allow_code(path)
     return str(path)
 
 
@@ -370,8 +370,8 @@ def test_another_process_has_the_model_that_a_scene_was_made_with_whatever_its_f
 
 def test_every_plug_in_of_the_package_has_its_name_and_a_summary() -> None:
     for kind in KINDS.values():
-        for name in plugins.names(kind):
-            part = plugins.load(kind, name)
+        for name in plugin_files.names(kind):
+            part = plugin_files.load(kind, name)
             assert isinstance(part, kind.types())
             assert part.name == name
             assert part.summary
@@ -380,7 +380,7 @@ def test_every_plug_in_of_the_package_has_its_name_and_a_summary() -> None:
 def refusal(kind: str, path: Path, text: str) -> str:
     """Why a file is refused, without its folder."""
     with pytest.raises(ValueError) as caught:  # noqa: PT011  (the caller looks at the words)
-        plugins.load(KINDS[kind], written(path, text))
+        plugin_files.load(KINDS[kind], written(path, text))
     assert "\n" not in str(caught.value)
     return str(caught.value).replace(f"{path.parent}{os.sep}", "")
 

@@ -23,7 +23,7 @@ from synchain.export import text
 from synchain.graphs import chain, from_matrix, ring
 from synchain.models.definitions.definition import OSCILLATOR
 from synchain.models.dynamics.network import network
-from synchain.models.inputs.plugins import names
+from synchain.models.inputs.plugin_files import names
 from synchain.models.interactions.coupling import MatrixCoupling
 from synchain.models.mechanics.components import Node
 from synchain.models.mechanics.oscillator import FieldModel

@@ -13,7 +13,7 @@ from parts import coupling_of, law_of, oscillator_of
 from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.dynamics.network import parameters
 from synchain.models.inputs.frozen import FrozenDict
-from synchain.models.inputs.plugins import names
+from synchain.models.inputs.plugin_files import names
 from synchain.models.mechanics.contact import KAPPA, ContactModel, FrictionLaw, regularise
 from synchain.models.mechanics.nondimensional import friction_coefficient
 from synchain.models.mechanics.parameter import Parameter

@@ -15,7 +15,7 @@ from parts import law_of as friction_law
 from synchain.graphs import Topology, topology
 from synchain.models.definitions.definition import OSCILLATOR
 from synchain.models.dynamics.network import network
-from synchain.models.inputs.plugins import names
+from synchain.models.inputs.plugin_files import names
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
 

@@ -17,7 +17,7 @@ from parts import edge, is_lagrangian, node, oscillator_of, parameters
 from synchain import Parameter
 from synchain.models import oscillators
 from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
-from synchain.models.inputs.plugins import PluginKind, load, names
+from synchain.models.inputs.plugin_files import PluginKind, load, names
 from synchain.models.mechanics.calculus import cancelled, operations
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.nondimensional import FRICTION, nondimensional, physical, scale

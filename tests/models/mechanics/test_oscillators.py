@@ -17,7 +17,7 @@ from synchain.models.definitions.definition import OSCILLATOR
 from synchain.models.dynamics.network import oriented_links
 from synchain.models.dynamics.variational import source_slopes
 from synchain.models.inputs.frozen import FrozenDict
-from synchain.models.inputs.plugins import names
+from synchain.models.inputs.plugin_files import names
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.energy import energy_terms
 from synchain.models.sweeps.initial_values import default_start

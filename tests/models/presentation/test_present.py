@@ -18,7 +18,7 @@ from synchain.models.definitions.definition import FRICTION_LAW, OSCILLATOR
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
-from synchain.models.inputs.plugins import names
+from synchain.models.inputs.plugin_files import names
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.mechanics.contact import ContactModel
 from synchain.models.presentation.equations_text import LARGEST, as_dict, latex, text

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from synchain.graphs import chain, complete, feed_forward, ring
 from synchain.models.graphs.families import topology
-from synchain.models.graphs.products import cartesian, kronecker, union
+from synchain.models.graphs.graph_products import cartesian, kronecker, union
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.spectra.characteristic import characteristic
 from synchain.models.spectra.eigenvalue import Blocks, Eigenvalue

@@ -12,7 +12,7 @@ from family_sizes import size, sizes
 
 from synchain.graphs import Topology, chain, one_way_ring, ring, star
 from synchain.models.graphs.families import family, topology
-from synchain.models.graphs.products import cartesian, complement, kronecker, union, weighted
+from synchain.models.graphs.graph_products import cartesian, complement, kronecker, union, weighted
 from synchain.models.spectra.eigenvalue import ProofError
 from synchain.models.spectra.modular import check_modulo
 from synchain.models.spectra.solve import Proof, spectrum

@@ -14,7 +14,7 @@ from family_sizes import size
 
 from synchain.graphs import chain, complete, complete_bipartite, hypercube, kneser, one_way_ring, ring, star, wheel
 from synchain.models.graphs.families import topology
-from synchain.models.graphs.products import union, weighted
+from synchain.models.graphs.graph_products import union, weighted
 from synchain.models.graphs.readers import from_edges
 from synchain.models.graphs.topology import Topology
 

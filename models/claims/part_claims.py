@@ -31,7 +31,7 @@ from ..algebra.equality import Number, equal, sign
 from ..algebra.lazy import LazyEigenvalues
 from ..algebra.roots import Root
 from ..graphs.families import family, topology
-from ..graphs.products import factors
+from ..graphs.graph_products import factors
 from ..graphs.topology import Topology
 from ..spectra.eigenvalue import Eigenvalue, words
 from ..spectra.solve import Proof, has_closed_form, spectrum
