@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.checks import check_number, short_repr, suggestion
+from synchain.models.presentation.equations_text import text
 
 from .body import check_inertia
 from .exported_events import without_events
@@ -35,6 +36,10 @@ class Exported:
         numbers = dict(zip(model.parameters, checked.values(), strict=bool(checked)))
 
         # the head, without comment marks
+        try:
+            formulas = text(equations).splitlines()
+        except ValueError:  # some function has no short form; the exported code contains the function
+            formulas = ["(equations with functions that have no short form: see below)"]
         states = list(model.state)
         if len(states) > SHOWN:
             states = [*states[:3], "…", *states[-3:]]
@@ -42,7 +47,7 @@ class Exported:
         lines = [
             f"{equations.n} oscillator{'s' * (equations.n != 1)}, {equations.link_count} links, written by synchain",
             "",
-            *_formulas(equations),
+            *formulas,
             "",
             f"State ({equations.dimension}): {', '.join(states)}",
             f"Parameters ({len(names)}): {', '.join(names) or 'none'}",
@@ -51,15 +56,6 @@ class Exported:
             *(f"Renamed: {old} is called {new}" for old, new in changed.items()),
         ]
         return cls(model, numbers, [" ".join(line.splitlines()) for line in lines])
-
-
-def _formulas(equations: Equations) -> list[str]:
-    from synchain.models.presentation.equations_text import text
-
-    try:
-        return text(equations).splitlines()
-    except ValueError:  # some function has no short form; the exported code contains the function
-        return ["(equations with functions that have no short form: see below)"]
 
 
 def _checked(equations: Equations, values: Mapping[str, float] | None) -> dict[str, float]:

@@ -17,8 +17,6 @@ import sympy as sp
 from .families import family, names, topology
 from .topology import Topology
 
-__all__ = ["NODE", "ClosedForm", "D", "J", "K", "M", "N", "P", "Q", "Term", "closed_form", "entries", "formulas"]
-
 # n: nodes; k, j: indices of eigenvalues; p, q: sizes of directions or groups; d: dimension; m: number of an
 # eigenvector; i: number of a node, from 0.
 N, K, J, P, Q, D, M, NODE = sp.symbols("n k j p q d m i", integer=True, nonnegative=True)

@@ -20,8 +20,6 @@ from .topology import Topology
 if TYPE_CHECKING:
     import sympy as sp
 
-__all__ = ["TOPOLOGY", "Eigenvalues", "Family", "FamilyRule", "family", "names", "topology"]
-
 Edges: TypeAlias = "Callable[..., Iterable[tuple[int, int, int | str | Fraction]]]"
 Eigenvalues: TypeAlias = "Sequence[tuple[sp.Expr | int, int]] | None"
 

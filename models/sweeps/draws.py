@@ -205,7 +205,16 @@ def drawn_axes(model: Model, drawn: FrozenDict[Draws], count: int, rng: int) -> 
 def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Iterable[tuple[str, Sequence[float]]]:
     """Return the parameters and states of single nodes and links of one draw, with a value for each realisation."""
     if isinstance(how, Graphs | RandomGraph):
-        return _weights(model, _realised(how, count, rng).graphs)
+        # Weights of all links of the union of the graphs; 0 where a graph has no link.
+        of_union = model.link_names(WEIGHTS)
+        try:
+            rows = [{at[:2]: float(at[2]) for at in graph.links} for graph in _realised(how, count, rng).graphs]
+        except OverflowError:
+            raise ValueError(
+                f"draw {GRAPH}: found a weight beyond the range of numbers; expected at most 1.8e308"
+            ) from None
+        named = [by_name("draw topology", of_union, {at: row.get(at, 0.0) for at in of_union}) for row in rows]
+        return [(str(link), [row[link] for row in named]) for link in named[0]]
     holders = model.unlinked.holders(name)
     links = {} if holders else model.link_names(name)
     if links:
@@ -226,19 +235,6 @@ def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Itera
     if width not in (1, len(names)):
         raise ValueError(f"draw {name}: found rows of {width} numbers; expected 1 or {len(names)}, one for each node")
     return [(single, [row[min(k, width - 1)] for row in how]) for k, single in enumerate(names)]
-
-
-def _weights(model: Model, graphs: tuple[Topology, ...]) -> Iterable[tuple[str, Sequence[float]]]:
-    """Return the weights of all links of the union of graphs, by name; 0 where a graph has no link."""
-    links = model.link_names(WEIGHTS)
-    try:
-        rows = [{at[:2]: float(at[2]) for at in graph.links} for graph in graphs]
-    except OverflowError:
-        raise ValueError(
-            f"draw {GRAPH}: found a weight beyond the range of numbers; expected at most 1.8e308"
-        ) from None
-    named = [by_name("draw topology", links, {at: row.get(at, 0.0) for at in links}) for row in rows]
-    return [(str(link), [row[link] for row in named]) for link in named[0]]
 
 
 def _link_columns(

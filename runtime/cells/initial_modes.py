@@ -72,7 +72,7 @@ def _link_forces(
 
 
 def local_clock(equations: Equations, period: np.ndarray) -> np.ndarray:
-    """Return the period (cells,) of the clock of each cell;"""
+    """Return the period (cells,) of the clock of each cell."""
     # `period` (cells,): period of the drive, 0 without a drive. Times of events are read from the clock, with its
     # rounding error. If time does not enter the equations, the period may have any length; a short one keeps the digits
     # of events in long runs.

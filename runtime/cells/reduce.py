@@ -29,8 +29,6 @@ from .buffers import IN_MEMORY, Buffers, numbers_of_a_cell
 from .observable_arrays import ObservableArrays, Sections, watched
 from .plan import CellRows, Planner
 
-__all__ = ["NodeMerge", "ReducedScene", "as_reduction", "explain", "reduce_scene"]
-
 DIVERGED = "diverged: the cell ends as soon as its state is out of bounds"
 PERIODIC = (
     "periodic: a cell that repeats itself bit for bit from one period of the drive to a later one jumps over whole cycles, "

@@ -48,7 +48,7 @@ def first_step(growth: float) -> float:
 
 
 def tolerances(scene: Scene, equations: Equations, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (rtol, atol), each (cells,), of the integration;"""
+    """Return (rtol, atol), each (cells,), of the integration."""
     # `parameters` (cells, count) are those of the equations. A smoothed jump of friction has the width 1/kappa in
     # velocity; steps that do not resolve this width miss the jump. With contact "atan", rtol is therefore at most
     # 1/kappa and atol at most 0.1/kappa (not below 1e-13), for the largest kappa of the nodes.
@@ -56,20 +56,16 @@ def tolerances(scene: Scene, equations: Equations, parameters: np.ndarray) -> tu
     columns = [k for k, name in enumerate(equations.parameters) if name.startswith("kappa")]
     if scene.contact != "atan" or not columns or not len(parameters):
         return rtol, atol
-    names = _names_of(scene, "kappa")
+    # One kappa for all nodes, or kappa_1 … for each node, or kappa_1_2 … for each link.
+    names = {"kappa"}
+    if "kappa" in scene.varied:
+        links = scene.model.link_names("kappa")
+        names = {*map(str, links.values())} or {str(NodeName("kappa", i)) for i in scene.model.holders("kappa")}
     columns = [k for k in columns if equations.parameters[k] in names]
     if columns:
         width = 1.0 / np.maximum(parameters[:, columns].max(axis=1), 1e-300)
         rtol, atol = np.minimum(rtol, np.maximum(width, 1e-13)), np.minimum(atol, np.maximum(0.1 * width, 1e-13))
     return rtol, atol
-
-
-def _names_of(scene: Scene, name: str) -> set[str]:
-    """Return the names of a parameter in a scene: a single name, a_1 … a_n for each node, or k_1_2 … for each link."""
-    if name not in scene.varied:
-        return {name}
-    links = scene.model.link_names(name)
-    return {*map(str, links.values())} or {str(NodeName(name, i)) for i in scene.model.holders(name)}
 
 
 def scale_of_atol(size: np.ndarray) -> np.ndarray:

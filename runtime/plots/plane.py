@@ -67,8 +67,12 @@ def draw_rays(axes: Axes, plane: Plane, sigma: float | None = None) -> Axes:
         unit = -complex(mode.eigenvalue.value)
         (ray,) = axes.plot([0.0, FAR * unit.real], [0.0, FAR * unit.imag], **RAY, **still)
         ray.set_label(rf"$-\sigma\gamma_k$ of {graph.name}({graph.n})" if mode.number == 1 else "")
-        if sigma is not None and _within(plane, sigma * unit):
-            (dot,) = axes.plot(sigma * unit.real, sigma * unit.imag, **DOT, **still)
+        if sigma is None:
+            continue
+        # A dot outside the drawn part of the plane would be listed in the legend although it is invisible.
+        x, y = sigma * unit.real, sigma * unit.imag
+        if plane.across[0] <= x <= plane.across[-1] and plane.up[0] <= y <= plane.up[-1]:
+            (dot,) = axes.plot(x, y, **DOT, **still)
             dot.set_label(rf"$\sigma={sigma:.3g}$")
     handles = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
     axes.figure.legend(
@@ -81,9 +85,3 @@ def draw_rays(axes: Axes, plane: Plane, sigma: float | None = None) -> Axes:
         borderpad=0.1,
     )
     return axes
-
-
-def _within(plane: Plane, point: complex) -> bool:
-    """Return True if a point lies in the drawn part of the plane."""
-    across, up = (row[0] <= value <= row[-1] for row, value in ((plane.across, point.real), (plane.up, point.imag)))
-    return bool(across and up)

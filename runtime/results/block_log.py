@@ -118,12 +118,13 @@ class BlockLog:
             places = np.full(about["blocks"], -1, dtype=np.int64)
             log = cls(Path(path), about, places, np.zeros(CODES, np.int64), file, file.tell())
             # Find the records; new records are appended behind the last record with a correct head.
-            size = os.fstat(log._file.fileno()).st_size
-            for offset, head, sound in _records(log._file, log._end, size):
+            size = os.fstat(file.fileno()).st_size
+            for offset, head, sound in _records(file, log._end, size):
                 _, block, length, _, _, most, *statuses, _ = head
                 if sound and block < len(log.places):
                     if log.places[block] >= 0:  # a block that was written twice after damage: the later record counts
-                        log.counts -= log._statuses(block)
+                        file.seek(int(log.places[block]))
+                        log.counts -= np.array(HEAD.unpack(file.read(HEAD.size))[6:-1])
                     log.places[block] = offset
                     log.counts += np.array(statuses)
                     log.most = max(log.most, most)
@@ -134,10 +135,6 @@ class BlockLog:
             file.close()
             raise
         return log
-
-    def _statuses(self, block: int) -> np.ndarray:
-        self._file.seek(int(self.places[block]))
-        return np.array(HEAD.unpack(self._file.read(HEAD.size))[6:-1])
 
     @property
     def done(self) -> np.ndarray:

@@ -18,8 +18,6 @@ from synchain.models.scenes.scene import Scene, check_scene
 
 from ..support.arrays import numbers
 
-__all__ = ["EnergyFunction", "energy_function"]
-
 Array = np.ndarray
 Formula = Callable[..., np.ndarray | float]
 Values = Mapping[str, float] | None

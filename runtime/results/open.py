@@ -73,15 +73,10 @@ def open_result(path: str | os.PathLike[str]) -> Labelled:
         return _warned(result_of(data, path), path)
     with understood(path):
         tree, kind = json.loads(data.attrs[VALUE]), data.attrs[KIND]
-        return decode(tree, data, _class_of(kind))
-
-
-def _class_of(kind: str) -> type[Labelled]:
-    """Return the result class of a name in `synchain.results`, which imports the module on first use."""
-    found = getattr(import_module("synchain.results"), kind, None)
-    if not isinstance(found, type) or not issubclass(found, Labelled):
-        raise ValueError(f"it holds a {kind}; expected a result")
-    return found
+        found = getattr(import_module("synchain.results"), kind, None)
+        if not isinstance(found, type) or not issubclass(found, Labelled):
+            raise ValueError(f"it holds a {kind}; expected a result")
+        return decode(tree, data, found)
 
 
 def _warned(result: Result, path: Path) -> Result:

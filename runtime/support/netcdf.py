@@ -37,7 +37,9 @@ class Sheet:
     def __init__(self, file: BinaryIO, template: xr.Dataset, lengths: Mapping[str, int]) -> None:
         self.file = file
         # SciPy writes the template; the header of this file is the same, with the lengths changed.
-        with netcdf_file(io.BytesIO(_bytes(template)), mmap=False) as source:
+        with netcdf_file(
+            io.BytesIO(bytes(template.to_netcdf(engine="scipy", format="NETCDF3_64BIT"))), mmap=False
+        ) as source:
             self.sizes = {name: lengths.get(name, size) for name, size in source.dimensions.items()}
             shapes = {name: tuple(self.sizes[d] for d in v.dimensions) for name, v in source.variables.items()}
             order = sorted(map(str, template.variables), key=lambda name: shapes[name], reverse=True)
@@ -129,10 +131,6 @@ def _digest(file: BinaryIO, offset: int) -> bytes:
         total.update(piece)
         position += len(piece)
     return total.hexdigest().encode()
-
-
-def _bytes(template: xr.Dataset) -> bytes:
-    return bytes(template.to_netcdf(engine="scipy", format="NETCDF3_64BIT"))
 
 
 def _padded(data: bytes) -> bytes:

@@ -32,7 +32,15 @@ def started(scene: Scene, start: StartValue) -> tuple[Scene, float]:
     if isinstance(start, Mapping):
         return scene.replace(initial=start), 0.0
     if isinstance(start, list | tuple | np.ndarray):
-        start = _in_order(scene, start)
+        # Label states in the order of the equations.
+        numbers, state_names = row("start", start), scene.equations.state
+        if len(numbers) != len(state_names):
+            raise ValueError(
+                f"start: found {len(numbers)} numbers; expected {len(state_names)}, of {_listed(state_names)}"
+            )
+        layout = States.of(scene)
+        labels = {"component": list(layout.components), "node": list(scene.topology.labels)}
+        start = xr.DataArray(layout.table(numbers), labels, STATE)
     end = _end(start)
     if not isinstance(end, xr.DataArray):
         raise TypeError(
@@ -143,16 +151,6 @@ def expect_whole_periods(planner: Planner) -> None:
                 f"continuation: the drive {where} at the end of a cell; expected the beginning of one, where the next cell "
                 "begins; let transient + window be whole drive periods, or set time_unit = 'period'"
             )
-
-
-def _in_order(scene: Scene, start: Sequence[float] | np.ndarray) -> xr.DataArray:
-    """Label states in the order of the equations."""
-    values, names = row("start", start), scene.equations.state
-    if len(values) != len(names):
-        raise ValueError(f"start: found {len(values)} numbers; expected {len(names)}, of {_listed(names)}")
-    states = States.of(scene)
-    labels = {"component": list(states.components), "node": list(scene.topology.labels)}
-    return xr.DataArray(states.table(values), labels, STATE)
 
 
 def _check_labels(scene: Scene, end: xr.DataArray) -> None:
