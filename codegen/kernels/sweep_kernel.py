@@ -49,11 +49,9 @@ AUTO = "rodas5p"  # the integrator for "auto"
 # Largest number of nodes whose steps are written out by default; steps of larger networks run in loops.
 LARGEST_UNROLLED = 8
 
+# Largest number of nodes whose steps are written out if the nodes carry deviations (`lift.lifted`). Measured on rings
+# of 5 to 8 Stuart-Landau oscillators: loops compile 2 to 6 times faster and run as fast within 10 %.
 LARGEST_UNROLLED_LIFT = 4
-"""Largest number of nodes whose steps are written out if the nodes carry deviations (`lift.lifted`).
-
-Measured on rings of 5 to 8 Stuart-Landau oscillators: loops compile 2 to 6 times faster and run as fast within 10 %.
-"""
 
 MOST_OF_LINKS = 1000  # largest number of operations of all links in a written-out step; more take minutes to compile
 
@@ -179,12 +177,10 @@ def emit(
     )
 
 
+# Largest number of operations of a step in two registers. Such a step has about 6000 instructions, as many as a
+# processor keeps decoded. `python -m benchmarks methods` times both widths: a longer step is up to a seventh faster in
+# one register.
 MOST_DECODED = 2200
-"""Largest number of operations of a step in two registers.
-
-Such a step has about 6000 instructions, as many as a processor keeps decoded. `python -m benchmarks methods` times
-both widths: a longer step is up to a seventh faster in one register.
-"""
 
 
 def _suited(equations: Equations, method: Integrator, count: int) -> int:

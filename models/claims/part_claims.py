@@ -42,11 +42,9 @@ from .number_text import exact_number
 # Most nodes of a graph whose spectrum is proved here, a choice: proofs of larger closed forms take seconds.
 LARGEST = 500
 
+# Most nodes of a graph whose eigenvalues are listed, a choice (a few seconds). The limit does not apply if the distinct
+# eigenvalues are few or computed one by one.
 LISTED = 5000
-"""Most nodes of a graph whose eigenvalues are listed, a choice (a few seconds).
-
-The limit does not apply if the distinct eigenvalues are few or computed one by one.
-"""
 
 WORDS = ("largest", "slowest", "ratio", "distinct", "multiplicity")
 T = TypeVar("T", bound=Number)

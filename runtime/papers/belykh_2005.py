@@ -39,6 +39,6 @@ reproduction = sc.results.Reproduction(
 print(reproduction)
 strengths = np.linspace(1.27, 1.3, 7)
 modes = [sc.exponents(scene, gk * np.array([0.5, 1.0]), g=gk / 3, starts=1, periods=1000).exponent for gk in strengths]
-plt.plot(strengths, modes)
+plt.legend(plt.plot(strengths, modes), ["γ = -k/2", "γ = -k"])
 plt.axhline(0, color="black", linewidth=0.5)
-plt.gca().set(xlabel="g k", ylabel="exponents of modes γ = -k/2 and -k")
+plt.gca().set(xlabel="g k", ylabel="exponent of a mode")

@@ -33,7 +33,8 @@ from ..results.labelled import Labelled
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Style rules of all fragments; fragments inherit the colours of the page.
+# Style rules of all fragments; fragments inherit the colours of the page. The attributes mark dark pages of Jupyter,
+# Visual Studio Code and this documentation: there, white plots with dark lines become dark plots with light lines.
 STYLE = """
 .synchain{font-family:system-ui,sans-serif;line-height:1.45}
 .synchain table{border-collapse:collapse;margin:.4em 0}
@@ -46,6 +47,8 @@ vertical-align:middle}
 .synchain .side{display:flex;flex-wrap:wrap;gap:1.5em;align-items:flex-start}
 .synchain .formulae{overflow-x:auto;padding:.1em 0}
 .synchain img{max-width:100%;background:#fff}
+[data-jp-theme-light=false] .synchain img,.vscode-dark .synchain img,[data-theme=dark] .synchain img{
+filter:invert(.9) hue-rotate(180deg)}
 .synchain .quiet{opacity:.75}
 """
 

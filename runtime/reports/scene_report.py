@@ -30,7 +30,9 @@ h2{font-size:1.15em;margin:1.6em 0 .5em;padding-top:.5em;border-top:1px solid rg
 pre{white-space:pre-wrap;overflow-wrap:anywhere;font-size:.85em}
 code{overflow-wrap:anywhere}
 img{display:block}
-@media (prefers-color-scheme:dark){body{background:#16181c;color:#e6e6e6}circle{stroke:#e6e6e6;stroke-width:.5}}
+@media screen and (prefers-color-scheme:dark){body{background:#16181c;color:#e6e6e6}
+circle{stroke:#e6e6e6;stroke-width:.5}
+img{filter:invert(.9) hue-rotate(180deg)}}
 @media print{body{background:#fff;color:#000;max-width:none;padding:0}h2{break-after:avoid}
 img,svg,table,math{break-inside:avoid}details{display:none}}
 """

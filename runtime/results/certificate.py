@@ -9,11 +9,9 @@ import numpy as np
 
 NEAR = 1e-11  # synchronisation error, relative to the size of the motion, below which a certified cell ends
 
+# Standard errors below 0 at which an exponent is certainly negative (a choice: an error probability of 2e-4). For
+# averages of few blocks Student's distribution replaces the normal one, at the same probability.
 ERRORS = 3.5
-"""Standard errors below 0 at which an exponent is certainly negative (a choice: an error probability of 2e-4).
-
-For averages of few blocks Student's distribution replaces the normal one, at the same probability.
-"""
 
 CHANCE = 1e-6  # largest probability of a burst from NEAR to BURST at which a cell may end early (a choice)
 BURST = 1e-6  # synchronisation error, relative to the size of the motion, that counts as a burst of a certified cell

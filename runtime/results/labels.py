@@ -73,6 +73,8 @@ MEANINGS = {
 # Conventions of the attributes `long_name`, `units`, `flag_values`, `flag_masks` and `flag_meanings` of a result.
 CONVENTIONS = "CF-1.11"
 
+# Variables with the unit "1" in every model: counts, non-dimensional times, and rates per non-dimensional time. States
+# and errors have the units of the model and are dimensionless only in a model with a scaling.
 DIMENSIONLESS = frozenset(
     {
         "steps", "rejected", "periods_skipped", "section_count", "method_steps", "end_time", "drive_phase",
@@ -80,9 +82,6 @@ DIMENSIONLESS = frozenset(
         "event_impacts", "event_slips", "event_resets", "time", "transversal_exponent", "transversal_stderr", "rtol_used",
     }
 )  # fmt: skip
-"""Variables with the unit "1" in every model: counts, non-dimensional times, and rates per non-dimensional time.
-
-States and errors have the units of the model and are dimensionless only in a model with a scaling."""
 
 # Variables that are states or distances of states.
 SCALED = frozenset({"end", "section", "trajectory", "sync_error", "sync_error_max", "sync_error_end"})

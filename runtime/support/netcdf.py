@@ -24,11 +24,9 @@ BLANK = "0" * 64
 DIMENSION, VARIABLE, ATTRIBUTE, ABSENT = (struct.pack(">i", tag) for tag in (10, 11, 12, 0))
 TYPES = {"b": 1, "c": 2, "h": 3, "i": 4, "l": 4, "f": 5, "d": 6}
 PIECE = 2**20  # bytes that are read at a time
+# Bytes of the largest variable whose size fits into the header. For a larger variable the header contains 2^32 - 1, and
+# readers compute the size from the dimensions.
 LARGEST = 2**32 - 4
-"""Bytes of the largest variable whose size fits into the header.
-
-For a larger variable the header contains 2^32 - 1, and readers compute the size from the dimensions.
-"""
 
 
 class Sheet:

@@ -44,11 +44,9 @@ from ..engines.choice import Ladder, chosen_for_rows, first_steps
 from ..engines.ladder_engine import run_rows
 from ..engines.step_control import DIRECTIONS, control_array
 
+# Largest change of a state, relative to its size, by a relative change rtol of a parameter: a choice. Beyond it the
+# state itself has no three digits.
 LOST = 1e-3
-"""Largest change of a state, relative to its size, by a relative change rtol of a parameter: a choice.
-
-Beyond it the state itself has no three digits.
-"""
 
 # Growth over the second half of a run that counts as exponential: a fifth power of time grows as much.
 EXPONENTIAL = 32.0

@@ -79,13 +79,13 @@ def test_a_long_chain_is_counted_to_the_node() -> None:
 
 
 def test_the_two_rossler_zeros_give_the_sizes_of_each_family() -> None:
-    """(0.186, 4.614), ratio 24.8 (Rössler a = b = 0.2, c = 9, x to x): n by hand from the closed forms."""
-    ranges = [(0.186, 4.614)]
-    assert largest_network("chain", ranges).n == math.floor(math.pi / 2 / math.atan(math.sqrt(0.186 / 4.614)))
+    """(0.1863, 4.6131), ratio 24.8 (Rössler a = b = 0.2, c = 9, x to x): n by hand from the closed forms."""
+    ranges = [(0.1863, 4.6131)]
+    assert largest_network("chain", ranges).n == math.floor(math.pi / 2 / math.atan(math.sqrt(0.1863 / 4.6131)))
     assert largest_network("star", ranges).n == 24
     largest = largest_network("hypercube", ranges)
     assert (largest.n, largest.counts) == (24, "dimension")
-    ratio = 4.614 / 0.186
+    ratio = 4.6131 / 0.1863
     odd = [n for n in range(3, 99, 2) if 1 / (4 * math.sin(math.pi / 2 / n) ** 2) <= ratio]
     even = [n for n in range(4, 99, 2) if 1 / math.sin(math.pi / n) ** 2 <= ratio]
     assert largest_network("ring", ranges).n == max(odd + even)
