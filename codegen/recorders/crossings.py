@@ -51,8 +51,10 @@ def settled(k, row, zeros):
 
 @njit(error_model="numpy", forceinline=True)
 def memory(k, zeros):
-    """Return the slot of the depth of each lane for function k; its settled values at the points of a panel follow."""
-    # In front are one row of values at any fraction of the step, and one for each point of a panel.
+    """Return the slot of the depth of each lane for function k; its settled values at the points of a panel follow.
+
+    In front are one row of values at any fraction of the step, and one for each point of a panel.
+    """
     return (len(zeros.rule) + 1) * (values_of(zeros.dims) + k)
 
 
@@ -80,8 +82,10 @@ def look(panel, width, zeros):
 
 @njit(error_model="numpy")
 def ready(k, level, zeros, control):
-    """Return the lanes that need not halve a panel of some level for function k, and whether others do."""
-    # The memory of each lane holds its depth: the lane uses panels of that level and above.
+    """Return the lanes that need not halve a panel of some level for function k, and whether others do.
+
+    The memory of each lane holds its depth: the lane uses panels of that level and above.
+    """
     slot = memory(k, zeros)
     depth = load(zeros.found, slot, WIDTH)
     wanted = depth >= 1.0 * level
@@ -122,9 +126,11 @@ def arrive(k, low, high, zeros):
 
 @njit(error_model="numpy")
 def locate(k, hits, point, panel, width, zeros):
-    """Return the zero of section function k between two points of a panel, and the lanes of `hits` that have one."""
-    # Regula falsi with the Anderson-Bjorck weight (BIT 13, 253, 1973), bisection where that stalls. A stretch of zeros
-    # has its beginning as the zero; a pole is none.
+    """Return the zero of section function k between two points of a panel, and the lanes of `hits` that have one.
+
+    Regula falsi with the Anderson-Bjorck weight (BIT 13, 253, 1973), bisection where that stalls.  A stretch of zeros has
+    its beginning as the zero; a pole is none.
+    """
     low = broadcast((panel + zeros.rule[point, POINT]) * width, WIDTH)
     high = broadcast((panel + zeros.rule[point + 1, POINT]) * width, WIDTH)
     g_low, g_high = value_of(k, point + 1, zeros), value_of(k, point + 2, zeros)

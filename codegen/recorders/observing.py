@@ -50,11 +50,13 @@ def hidden(seen, rule, control, dims):
 
 @njit(error_model="numpy")
 def rough(lane, i, width, seen, sums, rule, control, dims):
-    """Return True if the rule is too coarse for a value of a lane: its last Legendre coefficients are too large."""
-    # The rule is exact to about twice the degree of the interpolant, so its error is about the square of the last
-    # coefficient over the size of the value (Trefethen, SIAM Review 50, 67 (2008), theorem 4.5, for analytic
-    # functions). A narrow panel is compared with the size of the value at the points of the whole step; a value that is
-    # not exact enough in the narrowest panel is NaN.
+    """Return True if the rule is too coarse for a value of a lane: its last Legendre coefficients are too large.
+
+    The rule is exact to about twice the degree of the interpolant, so its error is about the square of the last
+    coefficient over the size of the value (Trefethen, SIAM Review 50, 67 (2008), theorem 4.5, for analytic functions).  A
+    narrow panel is compared with the size of the value at the points of the whole step; a value that is not exact enough
+    in the narrowest panel is NaN.
+    """
     coarse = False
     for k in range(dims.observed):
         top = following = size = 0.0
@@ -76,8 +78,10 @@ def rough(lane, i, width, seen, sums, rule, control, dims):
 
 @njit(error_model="numpy")
 def add(lane, i, length, seen, sums, rule, dims):
-    """Add a panel of some length to the integrals of a cell, and look for extremes."""
-    # The integrals are those of the distance from the first value, so that variances keep their digits.
+    """Add a panel of some length to the integrals of a cell, and look for extremes.
+
+    The integrals are those of the distance from the first value, so that variances keep their digits.
+    """
     for point in range(len(rule)):
         share, begins = length * rule[point, WEIGHT], point == 0 and sums[i, OBSERVED] == 0.0
         for k in range(dims.observed):
@@ -106,8 +110,10 @@ def vertex(a, m, b, at_a, at_m, at_b):
 
 @njit(error_model="numpy")
 def bracket(lane, k, sign, best, seen, rule, ends, dims):
-    """Write to `ends` the points of a panel around the maximum of sign * value k, and its values there."""
-    # Return the maximum of the parabola through them, as a fraction of the panel, and whether it exceeds `best`.
+    """Write to `ends` the points of a panel around the maximum of sign * value k, and its values there.
+
+    Return the maximum of the parabola through them, as a fraction of the panel, and whether it exceeds `best`.
+    """
     last, higher, guess = len(rule) - 1, False, 0.0
     for point in range(last + 1):
         low, high, centre = max(point - 1, 0), min(point + 1, last), min(max(point, 1), last - 1)
@@ -154,8 +160,10 @@ def narrow(row, u, at_u):
 
 @njit(error_model="numpy")
 def climb(added, begin, width, tallied, cell, sums, control):
-    """Raise the extremes of the cells in `added` to those between the points of a panel, by successive parabolas."""
-    # Only an extreme beyond those that are known is sought, and no closer than the tolerances.
+    """Raise the extremes of the cells in `added` to those between the points of a panel, by successive parabolas.
+
+    Only an extreme beyond those that are known is sought, and no closer than the tolerances.
+    """
     seen, rule, dims = tallied.seen, tallied.rule, tallied.dims
     ends, there, at = np.empty((WIDTH, 6)), np.empty(WIDTH), np.empty(computed(dims) * WIDTH)
     for k in range(dims.observed):

@@ -59,10 +59,12 @@ def upper(first, stride, values, rule):
 
 @njit(error_model="numpy")
 def simple(first, stride, values, rule, control):
-    """Return the lanes where a function passes zero at most once in a panel, or has no value at all."""
-    # It does so where all Bernstein coefficients lie on one side of zero; where all of their differences do, so that
-    # the function is monotonic; and where they change sides once and what the polynomial misses is within the
-    # tolerances. The value at a point stands `stride` behind that at the last one.
+    """Return the lanes where a function passes zero at most once in a panel, or has no value at all.
+
+    It does so where all Bernstein coefficients lie on one side of zero; where all of their differences do, so that the
+    function is monotonic; and where they change sides once and what the polynomial misses is within the tolerances.
+    The value at a point stands `stride` behind that at the last one.
+    """
     zero = broadcast(0.0, WIDTH)
     matrix = rule.shape[1] - len(rule)
     size, defined, missed = zero, zero > 0.0, MARGIN * upper(first, stride, values, rule)
