@@ -2,13 +2,13 @@
 from collections.abc import Iterable
 from typing import Literal, overload
 
-from synchain.models.graphs.hypergraph import Hypergraph as Hypergraph
-from synchain.models.graphs.hypergraph import triangles as triangles
 from synchain.models.graphs.graph_products import cartesian as cartesian
 from synchain.models.graphs.graph_products import complement as complement
 from synchain.models.graphs.graph_products import kronecker as kronecker
 from synchain.models.graphs.graph_products import union as union
 from synchain.models.graphs.graph_products import weighted as weighted
+from synchain.models.graphs.hypergraph import Hypergraph as Hypergraph
+from synchain.models.graphs.hypergraph import triangles as triangles
 from synchain.models.graphs.readers import from_edges as from_edges
 from synchain.models.graphs.readers import from_graph as from_graph
 from synchain.models.graphs.readers import from_sparse as from_sparse
