@@ -20,12 +20,11 @@ from ..program.statements import Statement, let
 
 @dataclass(frozen=True, slots=True)
 class NodeBlocks:
-    """The blocks of one kind of node.
+    """The blocks of one kind of node."""
 
-    `constants`: assignments that run once a step. `timed`: assignments that run once for each stage time. `rhs`
-    computes d(state)/dt. `linear` computes d(state)/dt, the Jacobian row by row and the partial time derivative.
-    Results that are symbols or numbers need no code.
-    """
+    # `constants`: assignments that run once a step. `timed`: assignments that run once for each stage time. `rhs`
+    # computes d(state)/dt. `linear` computes d(state)/dt, the Jacobian row by row and the partial time derivative.
+    # Results that are symbols or numbers need no code.
 
     constants: tuple[tuple[sp.Symbol, sp.Expr], ...]
     timed: tuple[tuple[sp.Symbol, sp.Expr], ...]
@@ -61,5 +60,4 @@ def analyse(node: Node, names: Names, varied: Iterable[str] = ()) -> NodeBlocks:
 
 
 def assigned(body: StraightLine) -> list[Statement]:
-    """Lower the assignments of a straight line."""
     return [let(s.name, lower(e)) for s, e in body.statements]

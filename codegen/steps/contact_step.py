@@ -32,14 +32,10 @@ from .places import StateLayout, link_ends, named, span
 from .safe_names import NAMES
 from .step import lane
 
-ACCELERATIONS = (2, 3, 4, 5)
-"""The groups of `pushes` to which each link adds its force."""
-
-SIDES = 9
-"""Number of groups of NODES numbers in front of the two numbers on jumps and kinks in time."""
-
+ACCELERATIONS = (2, 3, 4, 5)  # the groups of `pushes` to which each link adds its force
+SIDES = 9  # number of groups of NODES numbers in front of the two numbers on jumps and kinks in time
+# The second of the two numbers is evaluated at t + SOON max(1, t), a step of SHORTEST (codegen/driver/contacts.py).
 SOON = sp.Rational(1, 10**13)
-"""The second of the two numbers is evaluated at t + SOON max(1, t), a step of SHORTEST (codegen/driver/contacts.py)."""
 
 
 def push_functions(equations: Equations, names: Names, looped: bool = False) -> list[Function]:

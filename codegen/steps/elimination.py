@@ -20,13 +20,11 @@ from ..program.expressions import ONE, ZERO, Expression, Name, Negation, Product
 from ..program.lowering import lower
 from ..program.statements import Statement, let
 
-Entry = tuple[int, int]
-"""Row and column of an entry of a matrix."""
+Entry = tuple[int, int]  # row and column of an entry of a matrix
 
 Entries = dict[Entry, sp.Expr]
 
-SOLVES = 8
-"""Number of solves per factorisation that the cost of a plan assumes: the stages of rodas5p."""
+SOLVES = 8  # number of solves per factorisation that the cost of a plan assumes: the stages of rodas5p
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +43,9 @@ class EliminationPlan:
 
 
 def plan(size: int, pattern: set[Entry]) -> EliminationPlan:
-    """Order the pivots 0 … size-1 by least Markowitz cost and list the fill.
-
-    A second candidate begins with the rows without a diagonal entry of J, because their pivots need no division. The
-    second candidate is returned unless it costs more.
-    """
+    """Order the pivots 0 … size-1 by least Markowitz cost and list the fill."""
+    # A second candidate begins with the rows without a diagonal entry of J, because their pivots need no division. The
+    # second candidate is returned unless it costs more.
     first = frozenset(k for k in range(size) if (k, k) not in pattern)
     plans = (_ordered(size, pattern, first), _ordered(size, pattern, frozenset()))
     return min(plans, key=lambda each: each.multiplications)

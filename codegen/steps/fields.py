@@ -35,12 +35,11 @@ from .step import NOW, lane
 
 @dataclass(frozen=True, slots=True)
 class MeanField:
-    """The links between all pairs of nodes, as sums over the nodes.
+    """The links between all pairs of nodes, as sums over the nodes."""
 
-    shifted: states that enter the links only as differences between nodes. sums: the functions of the source that are
-    summed, by the name of each sum. shared: products of sums and of factors that all nodes share, by name. rates: the
-    rates of a node, in the names of `sums` and `shared` and in functions of the node.
-    """
+    # shifted: states that enter the links only as differences between nodes. sums: the functions of the source that are
+    # summed, by the name of each sum. shared: products of sums and of factors that all nodes share, by name. rates: the
+    # rates of a node, in the names of `sums` and `shared` and in functions of the node.
 
     edge: Edge
     node: Node
@@ -51,7 +50,6 @@ class MeanField:
 
     @classmethod
     def of(cls, number: int, edge: Edge, node: Node, pairs: AllPairs, parts: Separated) -> MeanField:
-        """Return mean field number `number` of a network."""
         weight = {edge.weight: sp.Rational(pairs.weight.numerator, pairs.weight.denominator)}
         symbols = {e: real(f"sum_{number}_{k}") for k, e in enumerate(parts.sources) if e != 1}
         totals = {sp.S.One: sp.Integer(pairs.n), **symbols}
@@ -118,12 +116,11 @@ class MeanField:
 
 @dataclass(frozen=True, slots=True)
 class LinkSums:
-    """The terms of a joint's links that are products f(target) g(source), as sums over the links of each node.
+    """The terms of a joint's links that are products f(target) g(source), as sums over the links of each node."""
 
-    functions: the functions g of the source, by name. sums: by the name of each sum, the factor of each link and the
-    name of the function g that the factor multiplies (or one). factors: functions of parameters that all links share,
-    by name. rates: the rates of a node, in the names of `sums` and `factors` and in functions of the node.
-    """
+    # functions: the functions g of the source, by name. sums: by the name of each sum, the factor of each link and the
+    # name of the function g that the factor multiplies (or one). factors: functions of parameters that all links share,
+    # by name. rates: the rates of a node, in the names of `sums` and `factors` and in functions of the node.
 
     joint: Joint
     functions: dict[sp.Symbol, sp.Expr]
@@ -227,10 +224,8 @@ def mean_fields(equations: Equations) -> list[MeanField]:
 
 
 def link_sums(equations: Equations, joints: Iterable[Joint]) -> tuple[list[LinkSums], list[Joint]]:
-    """Return the sums over links, and the joints with the terms that are no products.
-
-    Networks with contacts or with several kinds of nodes return no sums.
-    """
+    """Return the sums over links, and the joints with the terms that are no products."""
+    # Networks with contacts or with several kinds of nodes return no sums.
     sums, others = list[LinkSums](), list[Joint]()
     if equations.mixed or equations.sticks:
         return sums, [joint for joint in joints if joint.edge.acts]

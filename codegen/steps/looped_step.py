@@ -50,14 +50,11 @@ from .safe_names import NAMES
 from .sparse_plan import SparsePlan, block_pattern
 from .step import NOW, StepWriter, lane, linearised
 
+# The arrays that hold the matrix slots of a link's two blocks: derivatives by the target's states, by the source's.
 SLOTS = ("here_slot", "there_slot")
-"""The arrays that hold the matrix slots of a link's two blocks: derivatives by the target's states, by the source's."""
-
-STATES, PLACE = span("i", "DIMENSION"), Name("i")
-"""The loop over all states, and the index of a state in the loop."""
-
+STATES, PLACE = span("i", "DIMENSION"), Name("i")  # the loop over all states, and the index of a state in the loop
+# The vector in the workspace for each name that a written-out step uses; k1, k2, … of stages become K1, K2, …
 GROUPS = {"f": "SLOPE"}
-"""The vector in the workspace for each name that a written-out step uses; k1, k2, … of stages become K1, K2, …"""
 
 
 class LoopedStep(StepWriter):
@@ -149,11 +146,9 @@ class LoopedStep(StepWriter):
         self.put(kind.span.over(loop))
 
     def links(self, base: str, out: str, start: bool = False, jacobian: bool = False) -> None:
-        """Add the rates of each link to the vector `out`, unless `out` is empty.
-
-        `start`: at the time of the start of the step, not of a stage. `jacobian`: also subtract each link's Jacobian
-        entries from the matrix, and add each link's time derivatives to TIME_SLOPE.
-        """
+        """Add the rates of each link to the vector `out`, unless `out` is empty."""
+        # `start`: at the time of the start of the step, not of a stage. `jacobian`: also subtract each link's Jacobian
+        # entries from the matrix, and add each link's time derivatives to TIME_SLOPE.
         place = self.places.place
         for joint in self.joints:
             edge, swap = joint.edge, named(joint) | ({} if start else NOW)
@@ -245,7 +240,6 @@ class LoopedStep(StepWriter):
         self.put(STATES.over([*loop, store_in("STATE", PLACE, value)]))
 
     def solve(self, i: int) -> None:
-        """Turn the right-hand side of stage i into its rates."""
         m = self.method
         if not m.implicit:
             # K already holds the right-hand side f; with a mass matrix, solve M k = f
@@ -279,7 +273,6 @@ class LoopedStep(StepWriter):
     # -- end --------------------------------------------------------------------------------------------------
 
     def finish(self) -> None:
-        """Compute the new state, the error and the dense output."""
         m = self.method
         # extra stages that only the dense output needs
         if len(m.c) > m.stages:
@@ -324,10 +317,9 @@ class LoopedStep(StepWriter):
 
 
 class LoopMass:
-    """Write the terms of a mass matrix M in a looped step, and all solves of linear equations.
+    """Write the terms of a mass matrix M in a looped step, and all solves of linear equations."""
 
-    The head of codegen/steps/mass_solve.py states the equations that a step solves.
-    """
+    # The head of codegen/steps/mass_solve.py states the equations that a step solves.
 
     def __init__(self, writer: LoopedStep) -> None:
         self.writer = writer
@@ -445,11 +437,9 @@ class LoopMass:
     def stage_terms(
         self, place: Expression, slope: Expression, total: Expression
     ) -> tuple[list[Statement], list[Expression]]:
-        """Return the terms of F + rate*total with total = sum c k, and the statements that must precede them.
-
-        `carried` reads a vector from STATE: `total` if M is constant, since M F = f is known; F + rate*total if M
-        varies.
-        """
+        """Return the terms of F + rate*total with total = sum c k, and the statements that must precede them."""
+        # `carried` reads a vector from STATE: `total` if M is constant, since M F = f is known; F + rate*total if M
+        # varies.
         terms = [slope, ProductExpr((Name("rate"), total))]
         if not self.inertial:
             return [], terms

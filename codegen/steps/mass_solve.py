@@ -58,13 +58,11 @@ def momentum_slopes(edge: Edge, here: Sequence[sp.Symbol], there: Sequence[sp.Sy
 
 
 class Mass:
-    """Write the terms of a mass matrix M in a step that is written out; write nothing if M is the identity.
+    """Write the terms of a mass matrix M in a step that is written out; write nothing if M is the identity."""
 
-    entries: the non-zero entries of M by (row, column); empty if M is the identity. coupled: the entries that differ
-    from the identity. rows: the rows and columns of all coupled entries, which are solved together. names: the states
-    of
-    `rows`. constant: True if M depends on parameters only.
-    """
+    # entries: the non-zero entries of M by (row, column); empty if M is the identity. coupled: the entries that differ
+    # from the identity. rows: the rows and columns of all coupled entries, which are solved together. names: the states
+    # of `rows`. constant: True if M depends on parameters only.
 
     def __init__(self, writer: StepWriter) -> None:
         self.writer, self.equations, self.constant = writer, writer.equations, writer.equations.constant_mass
@@ -74,7 +72,6 @@ class Mass:
         self.names = [writer.state[row] for row in self.rows]
 
     def refuse(self, subject: str) -> None:
-        """Raise ValueError if M is not the identity."""
         if self.equations.inertial:
             parts = "links with inertia" if self.equations.inertial_links else "nodes with a mass matrix"
             raise ValueError(f"{subject}: found {parts}; expected none; use integrator 'rodas5p' or 'dop853'")

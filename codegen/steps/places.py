@@ -37,8 +37,6 @@ from ..program.statements import Assign, Loop, Statement, accumulate, let, store
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """The range of a loop."""
-
     index: str
     start: Expression
     stop: Expression
@@ -49,7 +47,6 @@ class Span:
 
 
 def span(index: str, stop: Value, start: Value = 0) -> Span:
-    """Return the range from `start` up to `stop`."""
     return Span(index, as_expression(start), as_expression(stop))
 
 
@@ -59,12 +56,10 @@ def load_from(vector: str, place: Expression) -> Load:
 
 
 def store_in(vector: str, place: Expression, value: Value) -> Statement:
-    """Store a value in a vector of the workspace."""
     return store("dense", plus(Name(vector), place), value)
 
 
 def add_to(vector: str, place: Expression, value: Value) -> Statement:
-    """Add a value to a vector of the workspace."""
     return accumulate("dense", plus(Name(vector), place), value)
 
 
@@ -228,10 +223,8 @@ def by_kind(equations: Equations) -> list[int]:
 
 
 def by_joint(equations: Equations) -> list[tuple[Link | Triad, Layer]]:
-    """Return the listed links and their layers in a kernel's order: joint after joint, then by rank at the target.
-
-    Consecutive links then add to different nodes, so that no addition waits for the previous one.
-    """
+    """Return the listed links and their layers in a kernel's order: joint after joint, then by rank at the target."""
+    # Consecutive links then add to different nodes, so that no addition waits for the previous one.
     ranks, ordered = Counter[tuple[int, int]](), []
     pairs = ((link, layer) for layer in equations.listed for link in layer.each())
     for number, (link, layer) in zip(joint_numbers(equations), pairs, strict=True):

@@ -36,11 +36,8 @@ from .places import Joint, Span, StateLayout, by_kind, link_ends, named
 from .safe_names import NAMES
 from .step import lane
 
-LAWS = {Law.SIGN: 0, Law.STOP: 1, Law.RESET: 2}
-"""The numbers of laws in the driver."""
-
-LEVEL, GAP, MODE, SPEED, RATE, RATIO = range(6)
-"""The groups of numbers in front of the looks."""
+LAWS = {Law.SIGN: 0, Law.STOP: 1, Law.RESET: 2}  # the numbers of laws in the driver
+LEVEL, GAP, MODE, SPEED, RATE, RATIO = range(6)  # the groups of numbers in front of the looks
 
 
 def most_rows(equations: Equations) -> int:
@@ -64,7 +61,6 @@ def contact_groups(equations: Equations) -> int:
 
 
 def row_count(equations: Equations) -> int:
-    """Return the number of rows of all nodes and links."""
     return sum(map(len, _all_rows(equations)))
 
 
@@ -116,8 +112,6 @@ def _full(rows: Sequence[Row], row: Row) -> list[sp.Expr]:
 
 
 class _Writer:
-    """The places of the numbers of rows in `out`."""
-
     def __init__(self, equations: Equations, names: Names) -> None:
         self.equations, self.names = equations, names
         self.rows, self.most = row_count(equations), most_rows(equations)

@@ -14,12 +14,13 @@ from synchain.models.dynamics.equations import Equations
 from ..program.passes import real
 from ..simd import elementary, lanes, special
 
+# The arrays of a sparse plan, in the order in which a kernel takes them.
 NAMES = (
     "target", "source", "node_slot", "here_slot", "there_slot", "order", "place", "row_start", "after_start", "column",
     "where",
 )  # fmt: skip
-"""The arrays of a sparse plan, in the order in which a kernel takes them."""
 
+# Names that generated code uses; an underscore is appended to a user's symbol of the same name.
 RESERVED = frozenset(
     {"i", "j", "k", "e", "old", "new", "graph", "weights", "pair", "factorise", "solve", "slopes", "NODES", "DIMENSION",
      "DENSE_ROWS", "FIELD",
@@ -34,19 +35,16 @@ RESERVED = frozenset(
     | set(NAMES)
     | set(keyword.kwlist) | set(dir(builtins)) | set(elementary.__all__) | set(lanes.__all__) | set(special.__all__)
 )  # fmt: skip
-"""Names that generated code uses; an underscore is appended to a user's symbol of the same name."""
 
+# Prefixes of names that steps form from names of states: k2_x_1, u_x_1, j_vx_1, …
 PREFIXES = (
     "m_", "l_", "pivot_", "inv_", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "u_", "f_", "r_", "at_", "ft_", "n_", "j_",
     "e_", "_", "along_", "value_", "bend_", "steady_", "g_", "mass_", "sum_", *(f"node{k}" for k in range(2, 10)),
 )  # fmt: skip
-"""Prefixes of names that steps form from names of states: k2_x_1, u_x_1, j_vx_1, …"""
 
+# Suffixes of states at the target and at the sources of a link, and at the first node.
 SUFFIXES = ("_here", "_there", "_beyond", "_first")
-"""Suffixes of states at the target and at the sources of a link, and at the first node."""
-
-NUMBERED = re.compile(r"_\d+$")
-"""Matches a suffix that numbers a node: x_1 is the state x of the first node."""
+NUMBERED = re.compile(r"_\d+$")  # matches a suffix that numbers a node: x_1 is the state x of the first node
 
 
 def tidy(equations: Equations) -> Equations:

@@ -28,33 +28,22 @@ from .elimination import EliminationPlan, Entry
 from .mass_solve import added_masses, momentum_slopes, turned_masses
 from .places import by_joint, by_kind, joint_numbers, where_table
 
+# Largest ratio of entries of the exact factors to entries of the matrix; above, factors are incomplete. A choice.
 FILL_LIMIT = 3.0
-"""Largest ratio of entries of the exact factors to entries of the matrix; above, factors are incomplete. A choice."""
-
-Pattern = tuple[Entry, ...]
-"""Row and column of the non-zero entries of a small block."""
+Pattern = tuple[Entry, ...]  # row and column of the non-zero entries of a small block
 
 
 @dataclass(frozen=True, slots=True)
 class SparsePlan:
-    """The plan of an elimination: integer arrays in the order of NAMES, weights of links, number of matrix entries.
+    """The plan of an elimination: integer arrays in the order of NAMES, weights of links, number of matrix entries."""
 
-    target, source (links,): ends of each link.
-
-    node_slot (size**2 * n,): matrix slots of the entries of each node's block; -1 for zeros. `size` is the largest
-    number of states of a node.
-
-    here_slot, there_slot (size**2 * links,): the same for each link's two blocks, the derivatives by the states of the
-    target and of the source.
-
-    order (dimension,): the pivots. place (dimension,): the inverse permutation of `order`.
-
-    row_start (dimension + 1,): the off-diagonal entries in the row of pivot order[q] have the numbers row_start[q] …
-    row_start[q + 1] - 1. after_start (dimension,): entries from after_start[q] on lie in columns of later pivots.
-    column (entries,): the column of each entry.
-
-    where: see codegen/steps/places.py.
-    """
+    # target, source (links,): ends of each link. node_slot (size**2 * n,): matrix slots of the entries of each node's
+    # block; -1 for zeros. `size` is the largest number of states of a node. here_slot, there_slot (size**2 * links,):
+    # the same for each link's two blocks, the derivatives by the states of the target and of the source. order
+    # (dimension,): the pivots. place (dimension,): the inverse permutation of `order`. row_start (dimension + 1,): the
+    # off-diagonal entries in the row of pivot order[q] have the numbers row_start[q] … row_start[q + 1] - 1.
+    # after_start (dimension,): entries from after_start[q] on lie in columns of later pivots. column (entries,): the
+    # column of each entry. where: see codegen/steps/places.py.
 
     arrays: tuple[np.ndarray, ...]
     weights: np.ndarray
@@ -64,12 +53,11 @@ class SparsePlan:
 
 @dataclass(frozen=True, slots=True)
 class _NetworkPattern:
-    """The pattern of the matrix. Equations that differ only in symbols or numbers share one pattern and one plan.
+    """The pattern of the matrix. Equations that differ only in symbols or numbers share one pattern and one plan."""
 
-    size: largest number of states of a node. kinds, joints: the block patterns of each kind of node and of each joint,
-    with the number of blocks. links: in the order of the kernel. where: the array of that name; the first size*n
-    entries are indices of states.
-    """
+    # size: largest number of states of a node. kinds, joints: the block patterns of each kind of node and of each
+    # joint, with the number of blocks. links: in the order of the kernel. where: the array of that name; the first
+    # size*n entries are indices of states.
 
     n: int
     size: int
@@ -86,11 +74,9 @@ def block_pattern(block: Iterable[Iterable[object]]) -> Pattern:
 
 
 def sparse_plan(equations: Equations, fill: float = FILL_LIMIT, solves: bool = True) -> SparsePlan:
-    """Plan the elimination of (s - J) for a network; time and memory are proportional to the number of links.
-
-    The factors are exact unless they have more than `fill` entries per entry of the matrix. If the method `solves` no
-    linear equations, the matrix has no entries.
-    """
+    """Plan the elimination of (s - J) for a network; time and memory are proportional to the number of links."""
+    # The factors are exact unless they have more than `fill` entries per entry of the matrix. If the method `solves` no
+    # linear equations, the matrix has no entries.
     edges = [edge for layer in equations.listed for _, edge in layer.edge_of]
     of_nodes = [_node_pattern(node) if solves else () for node in equations.nodes]
     of_links = [_link_patterns(edge) if solves else ((), ()) for edge in edges]
@@ -127,7 +113,6 @@ def _link_patterns(edge: Edge) -> tuple[Pattern, Pattern]:
 
 @lru_cache(maxsize=4)
 def _plan(network: _NetworkPattern, fill: float) -> SparsePlan:
-    """Plan the elimination of one pattern."""
     n, size, where = network.n, network.size, np.array(network.where, np.int64)
     # states (size, n): index of each state in the whole state; -1 if a node has fewer states
     states = where[: size * n].reshape(size, n) if network.mixed else np.arange(n * size).reshape(size, n)
@@ -157,11 +142,10 @@ def _plan(network: _NetworkPattern, fill: float) -> SparsePlan:
 
 @dataclass(frozen=True, slots=True)
 class _Blocks:
-    """The positions of many blocks in the matrix: blocks of nodes, or of one end of links.
+    """The positions of many blocks in the matrix: blocks of nodes, or of one end of links."""
 
-    states (size, n): index of each state in the whole state. rows, columns (blocks,): the nodes whose states are the
-    rows and columns of each block. parts: ranges of blocks with the same pattern.
-    """
+    # states (size, n): index of each state in the whole state. rows, columns (blocks,): the nodes whose states are the
+    # rows and columns of each block. parts: ranges of blocks with the same pattern.
 
     states: np.ndarray
     rows: np.ndarray
@@ -230,12 +214,8 @@ def _first_level(dimension: int, off: np.ndarray, pivots: np.ndarray) -> np.ndar
 
 
 def order(size: int, pattern: Collection[Entry], limit: float = np.inf) -> EliminationPlan | None:
-    """Order pivots by least degree in the symmetrised pattern; rows without a diagonal entry of J come first.
-
-    The cost is O(fill log n).
-
-    Return None as soon as the factors have more off-diagonal entries than the limit.
-    """
+    """Order pivots by least degree in the symmetrised pattern; rows without a diagonal entry of J come first."""
+    # The cost is O(fill log n). Return None as soon as the factors have more off-diagonal entries than the limit.
     rows: list[set[int]] = [set() for _ in range(size)]
     columns: list[set[int]] = [set() for _ in range(size)]
     on_diagonal, count = set[int](), 0

@@ -18,11 +18,9 @@ from ..program.passes import StraightLine, real
 from ..program.statements import Assign, Comment, Function, Return, Role, Statement, let, operations
 from .blocks import NodeBlocks, assigned
 
+# Largest number of operations of a function that is inlined into each stage; copies of longer ones compile slowly.
 LARGEST_INLINED = 400
-"""Largest number of operations of a function that is inlined into each stage; copies of longer ones compile slowly."""
-
-NOW = {TIME: real("now")}
-"""Replaces the time in expressions of links by `now`, the time of a stage."""
+NOW = {TIME: real("now")}  # replaces the time in expressions of links by `now`, the time of a stage
 
 SCALED = '''
 @njit(error_model="numpy", forceinline=True)
@@ -86,14 +84,12 @@ def linearised(state: Sequence[sp.Symbol]) -> list[str]:
 
 
 class StepWriter(ABC):
-    """Collect the statements of one step of `method`; `kinds` holds the NodeBlocks of each kind of node.
+    """Collect the statements of one step of `method`; `kinds` holds the NodeBlocks of each kind of node."""
 
-    `write` is the same for every network. Subclasses choose where states are stored: `UnrolledStep` in registers, node
-    by node; `LoopedStep` in memory, with loops over nodes and links.
-
-    A Rosenbrock method solves (shift M - J) k_i = M (f(y + sum a_ij k_j) + rate sum c_ij k_j) + d_i h f_t: Hairer &
-    Wanner, Solving Ordinary Differential Equations II (Springer, 1996), section IV.7.
-    """
+    # `write` is the same for every network. Subclasses choose where states are stored: `UnrolledStep` in registers,
+    # node by node; `LoopedStep` in memory, with loops over nodes and links. A Rosenbrock method solves (shift M - J)
+    # k_i = M (f(y + sum a_ij k_j) + rate sum c_ij k_j) + d_i h f_t: Hairer & Wanner, Solving Ordinary Differential
+    # Equations II (Springer, 1996), section IV.7.
 
     def __init__(self, equations: Equations, kinds: Sequence[NodeBlocks], method: Integrator) -> None:
         self.equations, self.kinds, self.method = equations, tuple(kinds), method
@@ -107,15 +103,12 @@ class StepWriter(ABC):
         self.of_nodes = {*self.states, *map(real, equations.varied), *self.inner}
 
     def put(self, *statements: Statement) -> None:
-        """Append statements."""
         self.statements += statements
 
     def let(self, name: str, value: Value) -> None:
-        """Append an assignment."""
         self.statements.append(let(name, value))
 
     def note(self, text: str) -> None:
-        """Append a comment."""
         self.statements.append(Comment(text))
 
     @contextmanager
@@ -214,11 +207,9 @@ class StepWriter(ABC):
         return call(*estimates, old, new, "rtol", "atol")
 
     def stiff_error(self, error: Value, last: Expression, share: Expression) -> Expression:
-        """Return the larger of the error and of the estimated error of the dense output in stiff components.
-
-        This estimate is dense_error (1 - 2 share) |last|; `last` is the last row of the dense output, and `share` is
-        shift/pivot: 1 if the state is not stiff (no estimate), near 0 if the state is stiff.
-        """
+        """Return the larger of the error and of the estimated error of the dense output in stiff components."""
+        # This estimate is dense_error (1 - 2 share) |last|; `last` is the last row of the dense output, and `share` is
+        # shift/pivot: 1 if the state is not stiff (no estimate), near 0 if the state is stiff.
         stiff = self.method.dense_error * (Number(1.0) - 2.0 * share) * call("absolute", last)
         return call("maximum", call("absolute", error), stiff)
 

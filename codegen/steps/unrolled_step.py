@@ -46,7 +46,6 @@ class UnrolledStep(StepWriter):
 
     @cached_property
     def mass(self) -> Mass:
-        """The writer of the mass matrix."""
         return Mass(self)
 
     def at(self, i: int, base: str) -> dict[sp.Symbol, sp.Symbol]:
@@ -59,7 +58,6 @@ class UnrolledStep(StepWriter):
         return [f"k{j + 1}_{name}" for j in range(count)]
 
     def opening(self) -> None:
-        """Load the state and the parameters."""
         for slot, name in enumerate(self.state):
             self.let(name, Load("y", Number(slot)))
         self.parameters()
@@ -173,7 +171,6 @@ class UnrolledStep(StepWriter):
     # -- stages -----------------------------------------------------------------------------------------------
 
     def advance(self, i: int) -> None:
-        """Compute the state of stage i > 0."""
         m = self.method
         for name in self.state:
             if m.implicit:
@@ -184,7 +181,6 @@ class UnrolledStep(StepWriter):
                 self.let(f"u_{name}", Name(name) + self.increment(m.a[i], self.stages(name, i)))
 
     def solve(self, i: int) -> None:
-        """Turn the right-hand side of stage i into its rates."""
         m = self.method
         if not m.implicit:
             self.mass.explicit("u" if i else "y", f"k{i + 1}")
@@ -202,7 +198,6 @@ class UnrolledStep(StepWriter):
     # -- end --------------------------------------------------------------------------------------------------
 
     def finish(self) -> None:
-        """Compute the new state, the error and the dense output."""
         m = self.method
         self.note("new state and error")
         errors: list[Expression] = []  # of the first error estimate, by state

@@ -6,13 +6,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-Interval = tuple[float, float]
-"""Closed interval (low, high)."""
-Predicate = Callable[[np.ndarray], np.ndarray]
-"""Maps an array of points to an array of truth values."""
-
+Interval = tuple[float, float]  # closed interval (low, high)
+Predicate = Callable[[np.ndarray], np.ndarray]  # maps an array of points to an array of truth values
+# Least width of a bracket relative to its ends; inside a narrower bracket points are equal by rounding.
 ROUNDING = 8.0 * float(np.finfo(float).eps)
-"""Least width of a bracket relative to its ends; inside a narrower bracket points are equal by rounding."""
 
 
 def grid_intervals(x: np.ndarray, good: np.ndarray) -> list[Interval]:
@@ -28,13 +25,11 @@ def grid_intervals(x: np.ndarray, good: np.ndarray) -> list[Interval]:
 def find(
     judge: Predicate, x: np.ndarray, resolution: float | np.ndarray, fan: int = 7
 ) -> tuple[list[Interval], np.ndarray]:
-    """Find the intervals on which a predicate holds.
-
-    Two neighbours of the grid with different truth values form a bracket. `fan` equally spaced points in the bracket
-    are evaluated, and the bracket narrows to the change next to its good end, until narrower than `resolution`. The
-    reported end of an interval is the middle of the bracket. Intervals between neighbours of the grid are not found.
-    Shapes: x (k,), resolution (k - 1,); returns verdict (k,), the truth values on the grid.
-    """
+    """Find the intervals on which a predicate holds."""
+    # Two neighbours of the grid with different truth values form a bracket. `fan` equally spaced points in the bracket
+    # are evaluated, and the bracket narrows to the change next to its good end, until narrower than `resolution`. The
+    # reported end of an interval is the middle of the bracket. Intervals between neighbours of the grid are not found.
+    # Shapes: x (k,), resolution (k - 1,); returns verdict (k,), the truth values on the grid.
     x = np.asarray(x, dtype=float)
     if x.ndim != 1 or len(x) < 1 or np.any(np.diff(x) <= 0):
         raise ValueError("the grid must be one increasing row of numbers")
@@ -78,14 +73,12 @@ def _narrow(judge: Predicate, good: np.ndarray, bad: np.ndarray, fan: int) -> tu
 
 
 def scale(intervals: Sequence[Interval], factor: float) -> list[Interval]:
-    """Multiply every interval by a positive factor."""
     if not factor > 0:
         raise ValueError(f"factor = {factor}; expected a positive number")
     return [(a * factor, b * factor) for a, b in intervals]
 
 
 def intersect(left: Sequence[Interval], right: Sequence[Interval]) -> list[Interval]:
-    """Return the intersection of two sets of intervals."""
     intervals = []
     for a, b in left:
         for c, d in right:

@@ -29,18 +29,15 @@ __all__ = ["LargestNetwork", "Method", "SizeUnit", "eigenratio", "largest_networ
 
 
 class SizeUnit(StrEnum):
-    """The quantity that measures the size of a network."""
-
     NODES = "nodes"
     DIMENSION = "dimension"
 
 
 class Method(StrEnum):
-    """The method that determined the largest network.
+    """The method that determined the largest network."""
 
-    CLOSED_FORM: no larger network can synchronise. OPEN_RANGE: every connected network can synchronise, because a range
-    starts at alpha = 0 or has no upper end. SEARCH: networks larger than the limit were not tried.
-    """
+    # CLOSED_FORM: no larger network can synchronise. OPEN_RANGE: every connected network can synchronise, because a
+    # range starts at alpha = 0 or has no upper end. SEARCH: networks larger than the limit were not tried.
 
     CLOSED_FORM = "closed form"
     OPEN_RANGE = "open range"
@@ -49,10 +46,9 @@ class Method(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class LargestNetwork:
-    """The largest network of a family that can synchronise for some sigma > 0.
+    """The largest network of a family that can synchronise for some sigma > 0."""
 
-    A size is None if every size can synchronise, and 0 if no network of two nodes or more can.
-    """
+    # A size is None if every size can synchronise, and 0 if no network of two nodes or more can.
 
     family: str  # name of the family
     n: int | None  # largest size for the given ranges
@@ -69,11 +65,9 @@ def largest_network(
     errors: Sequence[tuple[float, float]] | None = None,
     limit: int = 64,
 ) -> LargestNetwork:
-    """Find the largest network of a family that can synchronise, decided exactly.
-
-    The result holds for all sizes if there is a single range and the eigenratio has a closed form (see CLOSED), or if a
-    range starts at 0 or has no upper end. Otherwise every network up to the limit is tried.
-    """
+    """Find the largest network of a family that can synchronise, decided exactly."""
+    # The result holds for all sizes if there is a single range and the eigenratio has a closed form (see CLOSED), or if
+    # a range starts at 0 or has no upper end. Otherwise every network up to the limit is tried.
     if limit < 2:
         raise ValueError(f"limit = {limit}; expected at least 2 nodes")
     directed = family_plugin(family).directed
@@ -145,6 +139,7 @@ def _itself(n: int) -> Ball:
     return n
 
 
+# For each family with a closed form: smallest size, and the eigenratio as a function of size (None: always 1).
 CLOSED: dict[str, tuple[int, Callable[[int], Ball] | None]] = {
     "chain": (2, _chain),
     "complete": (2, None),
@@ -152,7 +147,6 @@ CLOSED: dict[str, tuple[int, Callable[[int], Ball] | None]] = {
     "ring": (3, _ring),
     "star": (2, _itself),
 }
-"""For each family with a closed form: smallest size, and the eigenratio as a function of size (None: always 1)."""
 
 
 def eigenratio(family: str, n: int) -> Ball:

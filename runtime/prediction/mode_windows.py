@@ -10,8 +10,8 @@ from synchain.models.graphs.topology import Topology
 from synchain.models.spectra.eigenvalue import Eigenvalue
 from synchain.models.spectra.jordan import geometric_multiplicity
 
+# Most nodes for which an eigenvector is computed (a choice); the matrix is dense and then takes 32 MB.
 VECTOR_LIMIT = 2000
-"""Most nodes for which an eigenvector is computed (a choice); the matrix is dense and then takes 32 MB."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,12 +27,10 @@ class NetworkMode:
 
     @property
     def size(self) -> float:
-        """|gamma| as a float."""
         return abs(self.eigenvalue.value)
 
     @property
     def multiplicity(self) -> int:
-        """Algebraic multiplicity."""
         return self.eigenvalue.multiplicity
 
     @property
@@ -42,11 +40,9 @@ class NetworkMode:
 
     @property
     def vector(self) -> np.ndarray:
-        """Unit eigenvector (n,) whose largest entry is positive; complex if the eigenvalue is.
-
-        For a multiple eigenvalue, return the vector that is most localised at a single oscillator; of equally localised
-        vectors, the vector at the first oscillator.
-        """
+        """Unit eigenvector (n,) whose largest entry is positive; complex if the eigenvalue is."""
+        # For a multiple eigenvalue, return the vector that is most localised at a single oscillator; of equally
+        # localised vectors, the vector at the first oscillator.
         n = self.graph.n
         if n > VECTOR_LIMIT:
             raise ValueError(f"eigenvector of {self.graph.name}({n}): expected at most {VECTOR_LIMIT} nodes")

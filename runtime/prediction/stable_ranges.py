@@ -10,18 +10,14 @@ from fractions import Fraction
 
 @dataclass(frozen=True, slots=True)
 class StableRange:
-    """A closed range of stable alpha."""
-
     low: Fraction  # lower end, at least 0
     high: Fraction | None  # upper end; None if there is none
     errors: tuple[float, float] = (0.0, 0.0)  # uncertainties of the ends
 
     @property
     def ratio(self) -> float:
-        """high / low, the largest eigenratio of a network whose modes all fit into the range.
-
-        The ratio is infinite for a range from 0 or without an upper end, and 0 for the single point alpha = 0.
-        """
+        """high / low, the largest eigenratio of a network whose modes all fit into the range."""
+        # The ratio is infinite for a range from 0 or without an upper end, and 0 for the single point alpha = 0.
         if self.high is None:
             return math.inf
         if self.low == 0:

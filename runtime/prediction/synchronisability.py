@@ -49,19 +49,15 @@ __all__ = [
 
 
 class Answer(StrEnum):
-    """Answer of a verdict."""
-
     NO = "no"
     UNDECIDED = "undecided within the error"
     YES = "yes"
     GRID_ENDS = "undecided: the function is negative where the grid of alpha ends"
 
 
+# Function that returns for complex alpha (m,), with imaginary part >= 0, True where the mode is stable (m,).
 Region = Callable[[np.ndarray], np.ndarray]
-"""Function that returns for complex alpha (m,), with imaginary part >= 0, True where the mode is stable (m,)."""
-
-LONGEST = 60
-"""Most characters of an exact ratio in texts (a choice)."""
+LONGEST = 60  # most characters of an exact ratio in texts (a choice)
 
 _EVERYTHING = StableRange(Fraction(0), None)
 
@@ -174,10 +170,8 @@ class _End:
 def windows(
     ranges: Sequence[tuple[float, float]], graph: Topology, errors: Sequence[tuple[float, float]] | None = None
 ) -> tuple[Window, ...]:
-    """Find the intervals of sigma on which every transversal mode lies in a stable range.
-
-    Ranges below alpha = 0 give intervals of negative sigma.
-    """
+    """Find the intervals of sigma on which every transversal mode lies in a stable range."""
+    # Ranges below alpha = 0 give intervals of negative sigma.
     above = [
         Window(low.sigma, high.sigma, low.error, high.error, low.mode, high.mode)
         for low, high in _intersection(exact_ranges(ranges, errors), graph)
@@ -203,11 +197,9 @@ def windows(
 def windows_complex(
     stable: Region, graph: Topology, sigma_grid: Sequence[float] | np.ndarray, resolution: float
 ) -> OneWay:
-    """Find the intervals of sigma on which every mode lies in a stable region of the complex plane.
-
-    The intervals are found on a grid and refined by bisection.
-    Shapes: sigma_grid (k,).
-    """
+    """Find the intervals of sigma on which every mode lies in a stable region of the complex plane."""
+    # The intervals are found on a grid and refined by bisection. Shapes: sigma_grid (k,).
+    #
     # Take one mode of each conjugate pair; unconnected parts add a mode with gamma = 0.
     modes = tuple(mode for mode in transversal_modes(graph) if complex(mode.eigenvalue.value).imag <= 0)
     values = np.array([mode.eigenvalue.value for mode in modes] + [0.0] * has_loose_parts(graph), dtype=complex)
