@@ -96,9 +96,11 @@ class OrbitProblem:
             check_links_of_events(equations)
         layers, size = len(equations.layers), strengths.shape[-1] if strengths.ndim == 4 else 1
         if strengths.size != len(strengths) * layers * size**2 or (size > 1 and np.iscomplexobj(strengths)):
+            names = scene.strengths
             raise ValueError(
                 f"transversal modes: found {layers} layer{'s' * (layers > 1)} of links, so that a mode has as many strengths; expected "
-                "one for each; `plane` takes the strengths of layers as axes, e.g. plane(scene, k=[0, 1], g=[0, 1])"
+                "one for each; exponents(scene, alpha) takes a column for each layer, or a matrix if they do not commute; "
+                f"plane(scene, {', '.join(f'{name}=[…]' for name in names[:2])}) and critical(scene, {names[0]!r}, …) take parameters"
             )
         variation = _variation(equations, bool(np.iscomplexobj(strengths)), size)
         if strengths.ndim == 4:
