@@ -85,7 +85,12 @@ def _zero_at_kinks(e: sp.Expr) -> sp.Expr:
     """Write sign(w)/|w|**q as sign(w)/(|w|**q + NOTHING), which is 0 in place of 0/0 at w = 0.
 
     The second derivative of |w|**(3/2) is infinite at w = 0, where slip begins and ends; deviations pass this instant.
+    A power q of parameters may have either sign: sign(w) |w|**q becomes sign(w) (|w| + NOTHING)**q.
     """
+    e = e.replace(
+        lambda p: isinstance(p, sp.Pow) and bool(p.exp.free_symbols) and kink_of(p.base) is not None,
+        lambda p: (p.base + NOTHING) ** p.exp,
+    )
     return e.replace(
         lambda p: isinstance(p, sp.Pow) and p.exp.is_negative and not p.exp.is_integer and kink_of(p.base) is not None,
         lambda p: 1 / (p.base**-p.exp + NOTHING),

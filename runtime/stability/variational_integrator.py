@@ -315,7 +315,7 @@ class VariationalIntegrator:
             largest = np.hypot.reduce(self.strengths).max()
             modes = f" of strengths up to {largest:g}" if largest else ""
             # rates of deviations have slopes of slopes: those of sqrt(|x|) have none at 0, where runs pass
-            remedy = "; deviations need finite slopes: write sqrt(abs(x)) as (x**2 + 1e-12)**(1/4), and abs(x)**p with a number p > 1"
+            remedy = "; deviations need finite slopes: write sqrt(abs(x)) as (x**2 + 1e-12)**(1/4), and abs(x)**p with p > 1"
             raise FloatingPointError(
                 f"the orbit with its deviations{modes} cannot be integrated: {status.message}"
                 f"{remedy if status is Status.STEP_UNDERFLOW else ''}"

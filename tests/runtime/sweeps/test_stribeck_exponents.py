@@ -63,8 +63,8 @@ def test_an_exponent_as_a_number(integrator: str) -> None:
     np.testing.assert_allclose(result.end.sel(component="x").values.ravel(), [by_hand(1.5)], atol=2e-7)
 
 
-def powers(text: str) -> sc.Scene:
-    law = sc.friction_law(f"sign(w)*(3/10 + {text}/5)")
+def powers(text: str, **parameters: float) -> sc.Scene:
+    law = sc.friction_law(f"sign(w)*(3/10 + {text}/5)", parameters)
     block = sc.Lagrangian("v**2/2", "x**2/2", {"x": "friction(1/5 - v) + cos(t)/3"}, coordinates={"x": "v"}, friction=law,
                           contact="set-valued")  # fmt: skip
     return sc.Scene(block, "spring", sc.graphs.chain(2), transient=0, window=6)
@@ -73,7 +73,8 @@ def powers(text: str) -> sc.Scene:
 def test_deviations_pass_the_start_of_slip_under_powers_above_one() -> None:
     """The second derivative of |w|**(3/2) is infinite at w = 0: exponents are those of a law that is rounded there."""
     smooth = sc.exponents(powers("(w**2 + 1e-10)**(3/4)"), [0.0, 0.1, 0.3]).exponent
-    np.testing.assert_allclose(sc.exponents(powers("abs(w)**(3/2)"), [0.0, 0.1, 0.3]).exponent, smooth, atol=2e-6)
+    for law in (powers("abs(w)**(3/2)"), powers("abs(w)**p", p=1.5), powers("(abs(w)/c)**p", p=1.5, c=1.0)):
+        np.testing.assert_allclose(sc.exponents(law, [0.0, 0.1, 0.3]).exponent, smooth, atol=2e-6)
     result = sc.run(powers("abs(2*w)**(3/2)"), sigma=[0.1, 0.3], certified=True, show_progress=False)
     assert result.success
 
