@@ -86,7 +86,7 @@ def function_of(omega: float, contact: str) -> MSF:
 
 
 def _row(omega: float, contact: str, found: MSF, graph: Topology, quick: bool) -> Row:
-    said = verdict(found.open_ranges, graph, found.uncertainties)
+    said = verdict(found.intervals, graph, found.uncertainties)
     sigma = sigma_of(found, said)
     window = "; ".join(f"{w.low:.4g} … {w.high:.4g}" for w in said.windows) or "none"
     told = (
@@ -110,9 +110,9 @@ def sigma_of(found: MSF, said: Verdict) -> float:
     if said.windows:
         widest = max(said.windows, key=lambda window: window.high - window.low)
         return 0.5 * (widest.low + widest.high)
-    if not found.open_ranges or said.slowest is None or said.fastest is None:
+    if not found.intervals or said.slowest is None or said.fastest is None:
         return math.nan
-    low, high = max(found.open_ranges, key=lambda r: r[1] / r[0] if r[0] > 0.0 else math.inf)
+    low, high = max(found.intervals, key=lambda r: r[1] / r[0] if r[0] > 0.0 else math.inf)
     return math.sqrt(low * high / (said.slowest.size * said.fastest.size))
 
 
@@ -131,7 +131,7 @@ def summary(rows: Sequence[Sequence[object]]) -> str:
     made = []
     for omega, contact in dict.fromkeys((float(str(row[0])), str(row[1])) for row in rows):
         found = function_of(omega, contact)
-        sizes = [_size(largest_network(name, found.open_ranges, found.uncertainties)) for name in sorted(CLOSED)]
+        sizes = [_size(largest_network(name, found.intervals, found.uncertainties)) for name in sorted(CLOSED)]
         made.append((f"{omega:g}", contact, interval_text(found.intervals, found.uncertainties), *sizes))
     names = [f"{name} (dimension)" if name == "hypercube" else name for name in sorted(CLOSED)]
     return markdown(("omega", "contact", "ranges of alpha", *names), made)

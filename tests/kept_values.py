@@ -19,9 +19,10 @@ from synchain.runtime.results.labelled import Labelled
 from synchain.runtime.results.reproduction import Reproduction
 from synchain.runtime.stability.attractor import Attractor, Motion
 from synchain.runtime.stability.cluster_exponents import ClusterExponents
+from synchain.runtime.stability.exponent_plane import Plane
 from synchain.runtime.stability.exponents import Exponents
 from synchain.runtime.stability.lyapunov import Lyapunov
-from synchain.runtime.stability.msf import MSF, Plane
+from synchain.runtime.stability.msf import MSF
 from synchain.runtime.sweeps.work_precision import WorkPrecision
 from synchain.runtime.synchronisation.basin import Basin
 from synchain.runtime.synchronisation.criterion import PAPER

@@ -47,9 +47,10 @@ from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
 from synchain.runtime.results.open import open_result
 from synchain.runtime.stability.cluster_exponents import cluster_exponents
+from synchain.runtime.stability.exponent_plane import plane
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum
-from synchain.runtime.stability.msf import msf, plane
+from synchain.runtime.stability.msf import msf
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import stream
 from synchain.runtime.synchronisation.basin import basin

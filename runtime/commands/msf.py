@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
     from synchain.models.scenes.scene import Scene
 
-    from ..stability.msf import MSF, Plane
+    from ..stability.exponent_plane import Plane
+    from ..stability.msf import MSF
 
 Rows: TypeAlias = "dict[str, tuple[float, ...]]"  # the values of parameters that are axes
 
@@ -78,7 +79,8 @@ def execute(arguments: Namespace) -> int:
     """Compute the function on a line or over a plane, print its summary, write its files."""
     import numpy as np
 
-    from ..stability.msf import default_strengths, msf, plane
+    from ..stability.exponent_plane import plane
+    from ..stability.msf import default_strengths, msf
     from ..support.files import output_folder
 
     with wrong_use():
@@ -116,7 +118,7 @@ def _write(function: MSF | Plane, folder: Path) -> list[Path]:
     from ..plots.canvas import off_screen
     from ..plots.csv_table import as_csv
     from ..plots.plane import draw_rays
-    from ..stability.msf import Plane
+    from ..stability.exponent_plane import Plane
     from ..support.files import whole_file, write_text
 
     paths = [folder / f"{type(function).__name__.lower()}{ending}" for ending in (".csv", ".png")]

@@ -67,7 +67,7 @@ HOMES = {
     "msf": "runtime.stability.msf",
     "open_result": "runtime.results.open",
     "periodic_orbit": "runtime.bifurcation.periodic",
-    "plane": "runtime.stability.msf",
+    "plane": "runtime.stability.exponent_plane",
     "run": "runtime.sweeps.run",
     "scene_names": "models.scenes.file",
     "skeleton": "runtime.bifurcation.skeleton",

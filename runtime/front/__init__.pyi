@@ -35,10 +35,10 @@ from synchain.runtime.engines.scene_kernels import kernel as kernel
 from synchain.runtime.results.energy_of_states import energy_function as energy_function
 from synchain.runtime.results.open import open_result as open_result
 from synchain.runtime.stability.cluster_exponents import cluster_exponents as cluster_exponents
+from synchain.runtime.stability.exponent_plane import plane as plane
 from synchain.runtime.stability.exponents import exponents as exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum as lyapunov_spectrum
 from synchain.runtime.stability.msf import msf as msf
-from synchain.runtime.stability.msf import plane as plane
 from synchain.runtime.sweeps.compiled import compile as compile
 from synchain.runtime.sweeps.merge_parts import merge as merge
 from synchain.runtime.sweeps.run import run as run

@@ -21,7 +21,7 @@ HOMES = {
     "Mismatch": "runtime.synchronisation.mismatch",
     "MSF": "runtime.stability.msf",
     "PeriodicOrbit": "runtime.bifurcation.periodic_result",
-    "Plane": "runtime.stability.msf",
+    "Plane": "runtime.stability.exponent_plane",
     "Probe": "runtime.synchronisation.probe",
     "Progress": "runtime.support.progress",
     "Reproduction": "runtime.results.reproduction",

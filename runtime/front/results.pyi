@@ -8,10 +8,10 @@ from synchain.runtime.bifurcation.results import Diagram as Diagram
 from synchain.runtime.results.reproduction import Reproduction as Reproduction
 from synchain.runtime.results.result import Result as Result
 from synchain.runtime.stability.cluster_exponents import ClusterExponents as ClusterExponents
+from synchain.runtime.stability.exponent_plane import Plane as Plane
 from synchain.runtime.stability.exponents import Exponents as Exponents
 from synchain.runtime.stability.lyapunov import Lyapunov as Lyapunov
 from synchain.runtime.stability.msf import MSF as MSF
-from synchain.runtime.stability.msf import Plane as Plane
 from synchain.runtime.support.progress import Progress as Progress
 from synchain.runtime.support.status import Status as Status
 from synchain.runtime.sweeps.compiled import CompiledResult as CompiledResult

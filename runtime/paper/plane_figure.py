@@ -18,7 +18,7 @@ from synchain.models.scenes.scene import Scene
 from ..plots.csv_table import as_csv
 from ..plots.plane import draw_plane, draw_rays
 from ..plots.style import COLUMN
-from ..stability.msf import Plane, plane
+from ..stability.exponent_plane import Plane, plane
 from .exponent_figure import HIGHEST, effort
 from .figure_runs import FigureRuns
 

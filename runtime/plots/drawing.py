@@ -19,9 +19,10 @@ from ..bifurcation.results import Bifurcation, Branch, Curve, Diagram
 from ..results.reproduction import Reproduction
 from ..results.result import Result
 from ..stability.cluster_exponents import BlockVerdict, ClusterExponents
+from ..stability.exponent_plane import Plane
 from ..stability.exponents import Exponents
 from ..stability.lyapunov import Lyapunov
-from ..stability.msf import MSF, Plane
+from ..stability.msf import MSF
 from ..sweeps.run import run
 from ..sweeps.stream import Streamed
 from ..sweeps.work_precision import WorkPrecision

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import TwoSlopeNorm
 
 from ..prediction.mode_windows import transversal_modes
-from ..stability.msf import Plane
+from ..stability.exponent_plane import Plane
 from .exponent import finite
 from .style import BLACK, symbol
 

@@ -19,13 +19,11 @@ pytestmark = pytest.mark.long
 
 def function(*ranges: tuple[float, float], error: float = 0.0) -> SimpleNamespace:
     """A stability function that is negative on these ranges."""
-    return SimpleNamespace(
-        open_ranges=ranges, intervals=ranges, uncertainties=tuple((error, error) for _ in ranges), scene=Scene()
-    )
+    return SimpleNamespace(intervals=ranges, uncertainties=tuple((error, error) for _ in ranges), scene=Scene())
 
 
 def sigma(function_of_alpha: SimpleNamespace, name: str, n: int) -> float:
-    return families.sigma_of(function_of_alpha, verdict(function_of_alpha.open_ranges, topology(name, n)))
+    return families.sigma_of(function_of_alpha, verdict(function_of_alpha.intervals, topology(name, n)))
 
 
 def test_sigma_is_the_middle_of_the_widest_window() -> None:

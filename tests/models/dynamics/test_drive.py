@@ -21,9 +21,10 @@ from synchain.runtime.bifurcation.skeleton import skeleton
 from synchain.runtime.cells.drive_times import by_place, half_swing
 from synchain.runtime.cells.plan import plan
 from synchain.runtime.stability.cluster_exponents import cluster_exponents
+from synchain.runtime.stability.exponent_plane import plane
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum
-from synchain.runtime.stability.msf import msf, plane
+from synchain.runtime.stability.msf import msf
 from synchain.runtime.sweeps.certify import check_certifiable
 from synchain.runtime.sweeps.run import run
 

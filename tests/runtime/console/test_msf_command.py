@@ -75,7 +75,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
         )
 
     monkeypatch.setattr(module, "msf", msf)
-    monkeypatch.setattr(module, "plane", plane)
+    monkeypatch.setattr(importlib.import_module("synchain.runtime.stability.exponent_plane"), "plane", plane)
     return collected
 
 

@@ -18,7 +18,7 @@ from synchain.runtime.bifurcation.results import Bifurcation
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.results.certificate import Certificate
 from synchain.runtime.results.result import gather
-from synchain.runtime.stability import msf
+from synchain.runtime.stability import exponent_plane
 
 
 def own(data: xr.Dataset) -> set[str]:
@@ -47,11 +47,11 @@ def test_no_result_has_other_attributes() -> None:
 
 
 def test_no_plane_and_no_branch_has_other_names() -> None:
-    result = msf.Plane(
+    result = exponent_plane.Plane(
         Scene("duffing", "spring", chain(2)), *np.eye(2), *np.zeros((2, 2, 2)), np.full((2, 2, 1), "rest"), 1.0,
         ("b", "c"), ("-1",), np.zeros((2, 2), int),
     )  # fmt: skip
-    assert (own(result.data) | {*result.as_dict()}) - TAKEN - {"b", "c"} <= msf.NAMES
+    assert (own(result.data) | {*result.as_dict()}) - TAKEN - {"b", "c"} <= exponent_plane.NAMES
     orbit = PeriodicOrbit(Scene("duffing"), 1, np.zeros(2), np.zeros(2), 0.0, 1)
     branch = results.Branch("b", np.zeros(1), (orbit,), (Bifurcation(0.0, BifurcationKind.FOLD, 0.0, orbit),),
         np.zeros(1, int), np.zeros(1),
