@@ -96,10 +96,7 @@ class Attractor:
         return exponents[1], apart.max(axis=0)
 
     def same_multipliers(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return where two rows of exponents (m,) on this cycle have the same largest multiplier (m,).
-
-        The difference may be MULTIPLIER times the largest entry of the propagator. A fixed point has no multipliers.
-        """
+        """Return where two rows of exponents (m,) have the same largest multiplier, to MULTIPLIER of a propagator."""
         if self.propagators is None or self.cycle == 0.0:
             return np.zeros(len(first), dtype=bool)
         shift = np.broadcast_to(self.logarithms, self.propagators.shape[:2])[1]
@@ -108,10 +105,7 @@ class Attractor:
         return np.asarray(apart <= MULTIPLIER * np.abs(self.propagators[1]).max(axis=(-2, -1)))
 
     def resolution(self) -> np.ndarray:
-        """Return the largest difference (m,) between the exponents of two starts on this attractor.
-
-        The difference comes from errors, and from the different states at which the starts end.
-        """
+        """Return the largest difference (m,) of exponents of two starts on this attractor that end at other states."""
         _, error = self.exponents()
         if self.propagators is None or self.cycle:
             return error + ALIKE / self.cycle
@@ -119,10 +113,7 @@ class Attractor:
 
 
 def find_attractor(problem: OrbitProblem, state: np.ndarray, patience: float) -> Attractor:
-    """Look for a fixed point, or a cycle of 1 … LONGEST drive periods, at a state (components,) after the transient.
-
-    `patience`: units of time before a new search.
-    """
+    """Look for a fixed point or a cycle at a state (components,); `patience`: units of time before a new search."""
     if problem.linear:
         timed = any(e.has(sp.Symbol("t", real=True)) for _, e in problem.variation.matrix)
         return (_periodic if timed else _steady)(problem, state, Motion.LINEAR)
@@ -194,10 +185,7 @@ def cycle_propagators(
 
 
 def _steady(problem: OrbitProblem, state: np.ndarray, motion: Motion) -> Attractor:
-    """Return the attractor of a motion along which the variational equation is constant.
-
-    Its propagators are the matrices (m, p, p) of the variational equation at `state`, one for each strength.
-    """
+    """Return the attractor of a constant variational equation; propagators are its matrices (m, p, p) at `state`."""
     variation, strengths = problem.variation, problem.strengths
     symbols = [sp.Symbol(name, real=True) for name in (*variation.orbit.state, *variation.orbit.parameters, "t")]
     values = [*state, *(problem.scene.parameters[name] for name in variation.orbit.parameters), 0.0]

@@ -122,10 +122,7 @@ class Averaging:
         rng: int | np.random.Generator | None,
         execution: Execution,
     ) -> Averaging:
-        """Return the averaging for the keywords of a public function.
-
-        If `transient` or `rng` is None, use the scene's.
-        """
+        """Return the averaging for keywords of a public function; None stands for the scene's `transient` and `rng`."""
         seed = check_seed("rng", chosen(scene, "rng", rng, 0))
         length, of_scene = chosen(scene, "transient", transient, None), False
         if transient is None:
@@ -258,19 +255,13 @@ class Batches:
         return self.blocks >= self.enough and self.blocks % self.per_batch == 0
 
     def plan(self, ratio: float, final: bool) -> None:
-        """Postpone the next estimate of the errors until the length is `ratio` times the present one.
-
-        `final`: store the present errors as a lower bound of later ones.
-        """
+        """Estimate errors next at `ratio` times the present length; `final`: present errors bound later ones."""
         if final:
             self.planned = self.error_by_start() * math.sqrt(self.blocks)
         self.enough = self.blocks * max(1.0, ratio)
 
     def ahead(self, most: int) -> np.ndarray:
-        """Return the number of blocks (batches,) in each of the next batches.
-
-        There are at most TOGETHER batches, and fewer if the errors are due before.
-        """
+        """Return the numbers of blocks (b,) of the next batches, at most TOGETHER, none after errors are due."""
         blocks, count, per_batch, parts = self.blocks, self.count, self.per_batch, list[int]()
         while most > 0 and len(parts) < TOGETHER and not (parts and blocks >= self.enough):
             count, per_batch = _with_room(count, per_batch)
@@ -287,10 +278,7 @@ class Batches:
             self.extend(growth[None], np.ones(1, dtype=np.int64))
 
     def extend(self, growths: np.ndarray, parts: np.ndarray) -> None:
-        """Add the growth (b, starts, m) over further batches.
-
-        `parts` (b,) are their numbers of blocks, from `ahead`.
-        """
+        """Add the growth (b, starts, m) over further batches; `parts` (b,): their numbers of blocks, from `ahead`."""
         if self.blocks == 0:
             self.sums = np.empty((BATCHES, *growths.shape[1:]))
         while len(growths):
@@ -336,10 +324,7 @@ class Batches:
 
 
 def _with_room(count: int, per_batch: int) -> tuple[int, int]:
-    """Return the numbers of batches and of blocks per batch before a further batch.
-
-    BATCHES batches are joined in pairs.
-    """
+    """Return the numbers of batches and of blocks per batch before a further batch; BATCHES are joined in pairs."""
     return (BATCHES // 2, 2 * per_batch) if count == BATCHES else (count, per_batch)
 
 

@@ -310,10 +310,7 @@ def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
 
 
 def _integrator(scene: Scene, partition: Clusters, seed: int) -> tuple[OrbitProblem, VariationalIntegrator]:
-    """Return the problem and the integrator of the quotient's orbit.
-
-    The integrator carries a random deviation of the clusters, and one in each block.
-    """
+    """Return the quotient's problem, and its integrator with random deviations of the clusters and of each block."""
     equations = without_drive(scene.equations, scene.parameters)
     parts = clustered(equations, partition)
     orbit, firsts = parts.variation.orbit, [members[0] for members in partition.members]

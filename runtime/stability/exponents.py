@@ -236,10 +236,7 @@ class Exponents(Labelled):
 
     @property
     def _judged(self) -> tuple[np.ndarray, np.ndarray, tuple[tuple[int, int], ...]]:
-        """Return the exponents (m,), whether each is negative (m,), and the undecided stretches of indices.
-
-        The first exponent is set to zero if it is zero within its error.
-        """
+        """Return exponents (m,), the first 0 if 0 within its error, signs (m,), and undecided stretches."""
         y, error = self.exponent, self.stderr
         rounding = ROUNDING * np.max(np.abs(y[np.isfinite(y)]), initial=0.0)
         if abs(y[0]) <= max(2.0 * error[0], rounding) < np.inf:
@@ -262,10 +259,7 @@ def exponent_rows(
     period: float | None = None,
     at_zero: float | None = None,
 ) -> tuple[tuple[str, str], ...]:
-    """Return rows of a summary: sizes of exponents, the attractor of each start, and the average.
-
-    `at_zero`: largest standard error beside the zeros of the exponent.
-    """
+    """Return rows of a summary; `at_zero`: largest standard error beside the zeros of the exponent."""
     kinds = (f"{kind} ({n} of {len(attractors)} starts)" for kind, n in Counter(attractors).most_common())
     drive = f" ({time / period:.0f} drive periods)" if period else ""
     length = f"{time:.6g} units of time{drive} for each start" if time else "not needed"
@@ -436,10 +430,7 @@ def orbits_of(
 def along(
     problem: OrbitProblem, states: np.ndarray, strengths: np.ndarray, averaging: Averaging, reporter: Reporter
 ) -> Exponents:
-    """Compute the exponents of all modes along orbits from states (starts, components).
-
-    Shapes: strengths (m,) or (m, layers).
-    """
+    """Compute exponents of modes of strengths (m,) or (m, layers) along orbits from states (starts, components)."""
     starts = len(states)
     bounded = np.ones(starts, dtype=bool)
     if not problem.linear:
@@ -488,10 +479,7 @@ def along(
 def _settled(
     problem: OrbitProblem, states: np.ndarray, transient: float, reporter: Reporter
 ) -> tuple[OrbitProblem, np.ndarray, np.ndarray]:
-    """Run the transient of all starts; return whether each start stays bounded (starts,).
-
-    Raise FloatingPointError if the first start does not.
-    """
+    """Run the transient of all starts; return also whether each start stays bounded (starts,); the first must."""
     bounded = np.ones(len(states), dtype=bool)
     try:
         return *problem.settled(states, transient, reporter.advance), bounded
@@ -511,10 +499,7 @@ def _settled(
 
 
 def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
-    """Return a single cell with a coupling; a lone oscillator gets a partner, if the scene has a link.
-
-    The scene may sweep strengths that do not change the synchronous orbit.
-    """
+    """Return one cell with a coupling; the scene may sweep strengths that do not change the synchronous orbit."""
     given.expect_one_cell(scene, unused_axes(scene))
     return without_open_stops(given.scene(with_partner(scene), rtol=rtol))
 
@@ -536,10 +521,7 @@ def with_partner(scene: Scene) -> Scene:
 
 
 def initial_states(scene: Scene, starts: int, seed: int) -> np.ndarray:
-    """Return states (starts, components): the first oscillator's initial state, and displaced copies.
-
-    The displacements are relative to the extent of the motion from the first state.
-    """
+    """Return states (starts, components): the first oscillator's, and copies displaced relative to its motion."""
     return orbits_of(scene, np.zeros(1), starts, Averaging(0.0, 1, 0, seed, Execution(1)))[1]
 
 
@@ -573,10 +555,7 @@ def group_by_attractor(
 
 
 def average(march: March, averaging: Averaging, reporter: Reporter) -> tuple[np.ndarray, np.ndarray, float]:
-    """Average growth rates along a march, from its present states.
-
-    Return the mean (starts, m), the error (starts, m), and the length of the average.
-    """
+    """Average growth rates along a march; return mean (starts, m), error (starts, m), and the length of the average."""
     batches, steps = Batches(march.problem.unit, march.block), np.zeros(())
     for left in averaging.rounds(batches, batches.error, reporter):
         if batches.blocks == 0:

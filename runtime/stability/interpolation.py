@@ -164,10 +164,7 @@ def _real(table: np.ndarray) -> np.ndarray:
 
 
 def _pieces(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
-    """Yield equal pieces of the real line with Chebyshev points of the second kind.
-
-    The strengths for comparison lie between the two outer points at each end, and in the middle.
-    """
+    """Yield equal pieces of the real line with Chebyshev points; compared strengths lie at ends and middle."""
     edges = np.linspace(strengths.min(), strengths.max(), count + 1)
     piece = np.clip(np.searchsorted(edges, strengths, side="right") - 1, 0, count - 1)
     # points and barycentric weights: Berrut & Trefethen, section 5
@@ -182,10 +179,7 @@ def _pieces(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
 
 
 def _squares(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
-    """Yield squares that cover the rectangle of the strengths.
-
-    The nodes of a square lie on the circle through its corners.
-    """
+    """Yield squares that cover the rectangle of the strengths; nodes lie on the circle through the corners."""
     low = complex(strengths.real.min(), strengths.imag.min())
     size = complex(strengths.real.max(), strengths.imag.max()) - low
     side = max(size.real, size.imag) / count

@@ -111,10 +111,7 @@ class LiftedIntegrator:
         self.orthogonal(length, np.ones(1, dtype=np.int64), NO_SHIFT.copy(), np.zeros((4, self.basis.shape[1])))
 
     def orthogonal(self, length: float, batches: np.ndarray, plan: np.ndarray, frame: np.ndarray) -> np.ndarray:
-        """Integrate over successive blocks of time; arguments and result as of `VariationalIntegrator.orthogonal`.
-
-        The growth of the volume is zero.
-        """
+        """Integrate blocks of time as `VariationalIntegrator.orthogonal`; the growth of the volume is zero."""
         count, dimension = self.start.shape
         growths, taken = np.zeros((len(batches), count + 1)), np.zeros(1, dtype=np.int64)
         buffers = Buffers.empty(count, dimension, room=0, samples=0)

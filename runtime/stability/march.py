@@ -111,10 +111,7 @@ class March:
         return self.integrator.follow(self.block * self.problem.unit, batches, self.deviations, batch_starts)
 
     def tried(self, most: int) -> tuple[np.ndarray, np.ndarray]:
-        """Advance by TRIED blocks, at most `most`; return the growth, and the error due to the steps.
-
-        Shapes: returns growth (blocks, starts, m), error (starts, m).
-        """
+        """Advance by at most TRIED blocks; return growth (blocks, starts, m) and error due to the steps (starts, m)."""
         count, (starts, size), vectors = min(most, TRIED), self.integrator.state.shape, self.deviations.vectors
         begun = np.empty((starts, count, size + vectors.shape[1]))
         usual = self.growths(np.ones(count, dtype=np.int64), begun)
@@ -128,10 +125,7 @@ class March:
 
 
 def interpolation_for(problem: OrbitProblem, states: np.ndarray, periods: float) -> BlockInterpolation:
-    """Choose the block length and the interpolation for an average over some periods, by trial on the next blocks.
-
-    Shapes: states (starts, components).
-    """
+    """Choose block length and interpolation for an average, by trial from states (starts, components)."""
     limit = max(0.01 * problem.scene.rtol, ALLOWED)  # the error of later blocks may be ten times larger
     failed: list[InterpolationChoice] = []
     for choice in _choices(problem, states, periods):
@@ -168,10 +162,7 @@ class InterpolationChoice:
         return BlockInterpolation(self.block, outer, inner)
 
     def is_coarser(self, other: InterpolationChoice) -> bool:
-        """Return True if the other choice has blocks no longer, and nodes no fewer, both in a panel and in all.
-
-        Of two choices with the same number of nodes, the one with fewer panels interpolates better.
-        """
+        """Return True if the other choice has no longer blocks and no fewer nodes, in a panel and in all."""
         these, others = ((c.nodes, c.stick_nodes, c.nodes * c.parts, c.stick_nodes * c.parts) for c in (self, other))
         return self.block >= other.block and all(a <= b for a, b in zip(these, others, strict=True))
 

@@ -103,10 +103,7 @@ class OrbitIntegrator(Protocol):
 
 
 class RateFunctions(NamedTuple):
-    """Functions of a state (p,) at time 0: the rates (p,), and the sum of the absolute values of each rate's terms.
-
-    Terms of a drive count with their amplitude.
-    """
+    """Rates of a state (p,) at time 0, and sums of the absolute values of terms; drives count with amplitude."""
 
     values: Callable[[np.ndarray], np.ndarray]
     sizes: Callable[[np.ndarray], np.ndarray]
@@ -247,10 +244,7 @@ def _summed(
 
 
 def _size(e: sp.Expr) -> sp.Expr:
-    """Return the sum of the absolute values of the terms of an expression, also inside products.
-
-    Sines and cosines of time count with their amplitude.
-    """
+    """Return the sum of absolute values of terms, also in products; waves of time count with their amplitude."""
     if isinstance(e, sp.sin | sp.cos) and e.has(TIME):
         return sp.S.One
     if isinstance(e, sp.Add | sp.Mul):
@@ -278,10 +272,7 @@ def above(extent: np.ndarray, rounding: np.ndarray) -> np.ndarray:
 
 
 def starts_near(state: np.ndarray, extent: np.ndarray, count: int, seed: int) -> np.ndarray:
-    """Return `count` states: `state` (p,), and copies with a random displacement of the first component.
-
-    The displacement is at most REACH times the extent.
-    """
+    """Return `count` states: a state (p,), and copies whose first component moves by at most REACH extents."""
     starts = np.tile(state, (count, 1))
     starts[1:, 0] += extent[0] * np.random.default_rng(seed).uniform(-REACH, REACH, count - 1)
     return starts
@@ -331,10 +322,7 @@ def path(
 
 
 def _cosine(first: np.ndarray, second: np.ndarray, extent: np.ndarray) -> float:
-    """Return the cosine of the angle between two vectors of rates (p,), in units of the extents.
-
-    NaN if a vector is zero.
-    """
+    """Return the cosine of the angle between rates (p,) in units of the extents; NaN if one is zero."""
     with np.errstate(all="ignore"):
         a, b = (np.where(extent > 0.0, rate / extent, 0.0) for rate in (first, second))
         return float(a @ b / np.sqrt((a @ a) * (b @ b)))

@@ -75,10 +75,7 @@ def transversal_modes(scene: Scene) -> tuple[JointEigenvalue, ...] | tuple[Trans
 
 
 def still_strengths(scene: Scene) -> set[str]:
-    """Return the names of strengths that do not change the synchronous orbit.
-
-    A strength does not change the orbit if the links of its layer vanish between equal states.
-    """
+    """Return strengths that do not change the synchronous orbit: of links that vanish between equal states."""
     pairs = zip(scene.strengths, scene.equations.layers, strict=True)
     return {name for name, layer in pairs if all(edge.diffusive for _, edge in layer.edge_of)}
 

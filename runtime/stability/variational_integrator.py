@@ -101,10 +101,7 @@ class GrowthWatch:
     last: np.ndarray = field(default_factory=lambda: np.array([[np.inf], [0.0]]))
 
     def status(self, codes: np.ndarray, steps: np.ndarray, times: np.ndarray, sizes: np.ndarray, most: float) -> Status:
-        """Return FINISHED, or the status of the first orbit that fails.
-
-        `codes`: statuses from the kernel. All shapes: (cells,).
-        """
+        """Return FINISHED, or the status of the first orbit that fails; `codes` are the kernel's. Shapes: (cells,)."""
         bad = codes != Status.FINISHED
         if bad.any():
             return Status(int(codes[bad.argmax()]))
@@ -211,10 +208,7 @@ class VariationalIntegrator:
         self.vectors[0, :, : basis.shape[1]] = basis
 
     def advance(self, length: float | np.ndarray) -> np.ndarray:
-        """Integrate over a length of time; return the logarithm of the growth of each deviation.
-
-        Shapes: length (cells,); returns (cells, modes).
-        """
+        """Integrate over lengths of time (cells,); return the log growth of each deviation (cells, modes)."""
         growth = np.empty((len(self.state), self.strengths.shape[1]))
         self._run(length, NO_PANELS, self.vectors, growth)
         return growth[:, self.order]
@@ -252,10 +246,7 @@ class VariationalIntegrator:
         self.control[[Control.RTOL, Control.ATOL]] *= ratio
 
     def beside(self, state: np.ndarray, ratio: float) -> VariationalIntegrator:
-        """Return an integrator with the same deviations along other orbits, and with tolerances larger by a ratio.
-
-        Shapes: state (cells, dimension).
-        """
+        """Return an integrator along other orbits, from `state` (cells, dimension), with looser tolerances."""
         times = len(state) // len(self.state)
         other = replace(
             self,
@@ -315,7 +306,9 @@ class VariationalIntegrator:
             largest = np.hypot.reduce(self.strengths).max()
             modes = f" of strengths up to {largest:g}" if largest else ""
             # rates of deviations have slopes of slopes: those of sqrt(|x|) have none at 0, where runs pass
-            remedy = "; deviations need finite slopes: write sqrt(abs(x)) as (x**2 + 1e-12)**(1/4), and abs(x)**p with p > 1"
+            remedy = (
+                "; deviations need finite slopes: write sqrt(abs(x)) as (x**2 + 1e-12)**(1/4), and abs(x)**p with p > 1"
+            )
             raise FloatingPointError(
                 f"the orbit with its deviations{modes} cannot be integrated: {status.message}"
                 f"{remedy if status is Status.STEP_UNDERFLOW else ''}"

@@ -163,10 +163,7 @@ class DirectSimulation:
     execution: Execution
 
     def simulate(self, sigma: np.ndarray, longer: float = 1.0, near: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Return the share of the starts that synchronised and the median error, each (sigma,).
-
-        `longer`: factor of the transient. `near`: begin near the synchronous state.
-        """
+        """Return shares and median errors (sigma,); `longer`: factor of the transient, `near`: from near synchrony."""
         scene = self.scene
         if near:
             first = {name: np.array(values[:1] * scene.n) for name, values in scene.initial.items()}
@@ -180,10 +177,7 @@ class DirectSimulation:
 
 
 def _explained(simulation: DirectSimulation, cells: Sequence[Cell], split: Sequence[bool]) -> list[Cell]:
-    """Return the cells with causes.
-
-    Simulate each disagreement again, for longer and from near the synchronous state.
-    """
+    """Return the cells with causes: simulate disagreements again, for longer and from near synchrony."""
     explained = list(cells)
     differing = [i for i, cell in enumerate(cells) if cell.outcome in OUTCOMES[2:4]]
     if not differing:
@@ -198,11 +192,7 @@ def _explained(simulation: DirectSimulation, cells: Sequence[Cell], split: Seque
 
 
 def _cause(cell: Cell, merged: bool, longer: float, near: float, split: bool) -> str:
-    """Return the cause of a disagreement.
-
-    `longer`, `near`: shares of the starts that synchronise after a longer transient, and from near the synchronous
-    state.
-    """
+    """Return the cause of a disagreement; `longer`, `near`: shares after a longer transient, and from near by."""
     stable = cell.outcome == OUTCOMES[2]
     mixed = 0.0 < cell.share < 1.0 or 0.0 < longer < 1.0
     if not stable and merged:

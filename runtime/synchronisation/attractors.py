@@ -164,10 +164,7 @@ class Attractors:
         return Features(columns("level"), np.sqrt(columns("swing")), columns("apart"))
 
     def ranges(self, features: Sequence[Features], box: Mapping[str, float]) -> np.ndarray:
-        """Return the range of each coordinate over all motions and starts, 2 for those of angles (coordinates,).
-
-        `box`: range of the starts of each component.
-        """
+        """Return the range of each coordinate (coordinates,) over motions and starts in `box`; 2 for angles."""
         level = np.concatenate([each.level for each in features])
         level = level[np.isfinite(level).all(axis=1)]
         extent = np.ptp(level, axis=0) if len(level) else np.zeros(len(self.coordinates))
@@ -175,10 +172,7 @@ class Attractors:
         return np.asarray(np.maximum(extent, starts))
 
     def speeds(self, observed: Mapping[str, np.ndarray], windows: np.ndarray, ranges: np.ndarray) -> np.ndarray:
-        """Return the largest part of its range, or of its period, by which a component moves within a window (cells,).
-
-        Shapes: windows (cells,), lengths of the windows; ranges (coordinates,).
-        """
+        """Return the largest part of its range, or period, that a component moves in windows (cells,)."""
         range_of = dict(zip(self.coordinates, ranges, strict=True))
         speed = np.sqrt(np.stack([observed[f"{PREFIX}speed_{k}"] for k in range(len(self.still))], axis=1))
         size = np.array([period or range_of[z] for z, period in self.still])

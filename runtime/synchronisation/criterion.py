@@ -209,10 +209,7 @@ def applied(criterion: Criterion, motion: SynchronousMotion, scene: Scene) -> Ap
 def resolved(
     criterion: Criterion, scene: Scene, measure: Callable[[float | None], SynchronousMotion]
 ) -> AppliedCriterion:
-    """Return a criterion from `preset`, with the numbers that follow from the motion.
-
-    `measure` is called again until the absolute tolerance resolves the motion.
-    """
+    """Return a `preset` criterion with numbers of the motion, measured until atol resolves the motion."""
     used = applied(criterion, measure(None), scene)
     for _ in range(PASSES):
         if used.atol is None:

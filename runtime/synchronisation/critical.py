@@ -353,10 +353,7 @@ def _at_zero(
     high: Evaluation,
     ends: tuple[Evaluation, Evaluation],
 ) -> Zero:
-    """Return the zero near a point whose exponent is zero within its error.
-
-    `low` and `high` bracket the point; `ends` bound the values at which exponents are computed.
-    """
+    """Return the zero near a point that is zero within its error, from `low` and `high` and new points."""
     first, last = ends[0].x, ends[1].x
     slope = (high.y - low.y) / (high.x - low.x)
     reach = max(APART * point.error / abs(slope) if math.isfinite(slope) else 0.0, LEAST * (last - first))

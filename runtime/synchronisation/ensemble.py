@@ -66,11 +66,7 @@ UNDECIDED = (APPROACHING, LEAVING, UNFINISHED)
 
 
 class Ensemble:
-    """The starts of all cells of a sweep, on their way.
-
-    The starts of a cell follow each other, those of one perturbed node together. Arrays (starts,) if not said
-    otherwise.
-    """
+    """Starts (starts,) of all cells of a sweep, on their way; those of one cell, or perturbed node, are adjacent."""
 
     def __init__(
         self,
@@ -228,10 +224,7 @@ class Ensemble:
         return CellRows((self.state if self.continues else self.start)[starts], self.numbers[cells], spans)
 
     def _look(self, starts: np.ndarray, until: np.ndarray) -> np.ndarray:
-        """Advance starts until some time; return those that run on, without those that are certain to synchronise.
-
-        Shapes: until (all starts,).
-        """
+        """Advance starts until times (all starts,); return those that run on and are not certain to synchronise."""
         certificate = self.certificate
         # the probability that the logarithm of an error ever climbs by g is exp(-2 g |exponent|/diffusion): Redner, A
         # Guide to First-Passage Processes (Cambridge, 2001), section 3.2

@@ -199,10 +199,7 @@ def mismatch(
 
 
 def driven_mode(scene: Scene, names: tuple[str, ...]) -> tuple[Oscillator, tuple[str, ...]]:
-    """Return an oscillator with the states of a node and of one mode, driven by mismatches of some parameters.
-
-    Return the names of the states of a node too.
-    """
+    """Return an oscillator of a node and one mode that mismatches drive, and the names of the node's states."""
     equations = scene.equations
     node, (slope,) = synchronous_node(equations), source_slopes(equations)
     swap = {s: sp.Symbol(f"{s.name}_deviation", real=True) for s in node.state}
@@ -247,10 +244,7 @@ def _mean_scene(scene: Scene) -> tuple[Scene, dict[str, np.ndarray]]:
 
 
 def _modes(scene: Scene, mismatches: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the eigenvalue (modes,) and the mismatch of each parameter (modes, parameters) in each driven mode.
-
-    Shapes: mismatches (parameters, n).
-    """
+    """Return eigenvalues (modes,) and mismatches (modes, parameters) of modes, from mismatches (parameters, n)."""
     graph = scene.model.linked[0][1]
     if graph.asymmetry or graph.components > 1:
         problem = graph.asymmetry or f"{graph.components} parts"

@@ -243,10 +243,7 @@ def _broadcast(alpha: ArrayLike, beta: ArrayLike) -> tuple[np.ndarray, np.ndarra
 
 
 def _rows(planner: Planner, names: tuple[str, ...], alpha: np.ndarray, beta: np.ndarray, moves: np.ndarray) -> CellRows:
-    """Return a row for every strength and start, the starts fastest.
-
-    `moves` (starts,): displacements of the positions of all oscillators together.
-    """
+    """Return a row for every strength and start, starts fastest; `moves` (starts,) displace all nodes together."""
     one, scene, starts = planner.rows(np.arange(1)), planner.scene, len(moves)
     count = len(alpha) * starts
     values = {**scene.parameters, MODE_ALPHA.name: 0.0, MODE_BETA.name: 0.0}

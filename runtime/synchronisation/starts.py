@@ -90,10 +90,7 @@ def _fill_at_random(
     perturbed: Sequence[int],
     seed: int,
 ) -> None:
-    """Draw the components of a box for the chosen nodes, or for one perturbed node after another.
-
-    Shapes: states (perturbed or 1, starts, dimension).
-    """
+    """Draw states (perturbed or 1, starts, dimension) in a box, for chosen nodes or one perturbed node a row."""
     places = {name: k for k, name in enumerate(scene.equations.state)}
     holders = {c: scene.equations.holders(c) for c in box}
     # columns of random numbers: one for each state, or for each component if nodes are perturbed in turn

@@ -69,10 +69,7 @@ def alike(equations: Equations, row: CellRows) -> CellRows:
 
 
 def first_starts(scene: Scene, count: int) -> dict[str, list[float]] | None:
-    """Return starts of `count` oscillators on the line through the starts of a scene's first two oscillators.
-
-    Return None if the scene has the default start.
-    """
+    """Return starts of `count` oscillators on the line through the scene's first two; None for default starts."""
     if scene.given["initial"] is None:
         return None
     first = {
@@ -161,10 +158,7 @@ def _without_drift(time: np.ndarray, states: np.ndarray, first: int) -> np.ndarr
 
 
 def _extent(time: np.ndarray, states: np.ndarray, late: int) -> np.ndarray:
-    """Return the extents of components in the last `late` states (times, components, nodes).
-
-    0 if all nodes are at rest.
-    """
+    """Return extents of components in the last `late` states (times, components, nodes); 0 if all nodes are at rest."""
     good = np.isfinite(states).all(axis=(1, 2))
     late = int(good[-late:].sum())
     if late < 3:

@@ -66,10 +66,7 @@ class Trials:
 
     @classmethod
     def of(cls, reduction: ReducedScene, execution: Execution) -> Trials:
-        """Return trials of a reduced scene.
-
-        The kernel is chosen for its cells, which represent the cells of all rounds.
-        """
+        """Return trials of a reduced scene, whose cells represent those of all rounds and choose the kernel."""
         strongest = reduction.rows(reduction.planner.extremes())
         source = write_kernel(reduction, method=chosen_for_rows(reduction.scene, reduction.equations, strongest))
         control = control_of(reduction.planner, reduction.jumps)
@@ -78,10 +75,7 @@ class Trials:
 
     @classmethod
     def by_ladder(cls, reduction: ReducedScene, execution: Execution) -> Trials:
-        """Return trials of a scene that is not reduced; the outcomes have its observables.
-
-        Each cell may change its integrator, as in `run`.
-        """
+        """Return trials of an unreduced scene with its observables; cells may change integrators, as in `run`."""
         problem = LadderSpec(reduction)
         return cls(reduction.scene, problem, problem.source(), execution)
 
