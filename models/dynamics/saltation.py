@@ -15,15 +15,15 @@ Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (S
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
 
 from ..mechanics.calculus import derivative
-from ..mechanics.components import TIME, Edge
+from ..mechanics.components import TIME, Edge, Node
 from ..mechanics.contact import SLIP
-from ..mechanics.rows import Law, forces
+from ..mechanics.rows import Law, Row, forces
 from .equations import Equations
 
 Entry = tuple[tuple[int, int], sp.Expr]
@@ -99,11 +99,13 @@ def of_rows(
     pushes: Mapping[tuple[int, int], sp.Matrix],
     names: Sequence[str] = (),
 ) -> Events:
-    """Return the events of rows, for deviations in blocks: block k deviates from node `owners[k]`, in the rows `slots[k]`.
+    """Return the events of rows, for deviations in blocks: block k deviates from the nodes of group `owners[k]`.
 
-    `pushes`: what block j adds to the rates of block k while its node holds no row.  Deviations of the parameters `names`
-    follow the blocks.  At an event of a gap h with the reset R a deviation becomes R_z d + (F+ - R_z F- - R_t) delta, with
-    delta = n d/(n F- + dh/dt) and n the gradient of h (Leine & Nijmeijer, chapter 7).
+    A group is a node, or a part of a network with rows in links; the rates and forces of a part contain its links.
+    `slots`: the rows of each block; `pushes`: what block j adds to the rates of block k while its node holds no row.
+    Deviations of the parameters `names` follow the blocks.  At an event of a gap h with the reset R a deviation becomes
+    R_z d + (F+ - R_z F- - R_t) delta, with delta = n d/(n F- + dh/dt) and n the gradient of h (Leine & Nijmeijer,
+    chapter 7).
     """
     size = sum(map(len, slots))
     deviations = sp.symbols(f"deviation_:{size + len(names)}", real=True)
@@ -119,13 +121,15 @@ def of_rows(
         return sp.Add(*(derivative(e, s) * moved for s, moved in along))
 
     jumps, start = [], list(deviations)
-    for i in sorted(range(orbit.n), key=orbit.kind_of.__getitem__):  # the order of rows in a kernel
-        rows, symbols = orbit.rows_at(i), orbit.symbols(i)
-        z = symbols[: len(orbit.node_at(i).continuous)]
-        then = dict(zip(symbols, (after[k] for k in orbit.places[i]), strict=True))
+    states = [sp.Symbol(name, real=True) for name in orbit.state]
+    for group, nodes, rows, places in _groups(orbit):
+        z = [states[k] for k in places]
+        then = {states[k]: after[k] for i in nodes for k in orbit.places[i]}
         held = [row for row in rows if row.law is not Law.RESET]
-        own = [k for k, owner in enumerate(owners) if owner == i]
-        along = {k: [*zip(z, blocks[k], strict=True), *by_names] for k in own}
+        own = [k for k, owner in enumerate(owners) if owner == group]
+        # the forces of a part hold the states of nodes that links join to it
+        others = [(states[k], deviations[k]) for at in slots for k in at] if orbit.joined else []
+        along = {k: [*(others or zip(z, blocks[k], strict=True)), *by_names] for k in own}
         for row in rows:
             # the gap that closes: off the surface the level, on it the distance of the force x from its limit
             mode, gap, turned, reset = row.mode, row.level, sp.S.Zero, list(z)
@@ -143,7 +147,8 @@ def of_rows(
             passing = change(gap, motion) + derivative(gap, TIME)
             jump = list(deviations)
             for k in own:
-                by_links = sp.Add(*(a * e for a, e in zip(row.answer, added[k], strict=True)))
+                # no answer in parts of more than MOST_ROWS rows, in which links add nothing
+                by_links = sp.Add(*(a * e for a, e in zip(row.answer, added[k], strict=False)))
                 lead = (change(gap, along[k]) + turned * by_links) / passing
                 for c, s, e in zip(slots[k], z, reset, strict=True):
                     gained = rates[s].xreplace(then) - change(e, [(s, rates[s]) for s in z]) - derivative(e, TIME)
@@ -169,25 +174,43 @@ def of_rows(
     return Events((-1,) * len(deviations), (), (*jumps, tuple(start)), tuple(after), deviations)
 
 
+def _groups(equations: Equations) -> Iterator[tuple[int, Sequence[int], Sequence[Row], Sequence[int]]]:
+    """Yield number, nodes, rows and places of continuous states of each part, or of each node, in the order of a kernel."""
+    for number, part in enumerate(equations.parts):
+        yield number, part.nodes, part.rows, part.places
+    for i in () if equations.joined else sorted(range(equations.n), key=equations.kind_of.__getitem__):
+        size = len(equations.node_at(i).continuous)
+        yield i, (i,), equations.rows_at(i), equations.places[i][:size]
+
+
 def check_links_of_events(equations: Equations) -> None:
     """Raise ValueError for links with the states that a row changes at once: the order of equal events then matters."""
-    if not equations.has_rows:
-        return
-    for (target, source), edge in equations.edge_of:
-        node, here = equations.nodes[source], len(equations.nodes[target].continuous)
-        changed = [
-            k
-            for k, s in enumerate(node.continuous)
-            for row in node.rows
-            if (row.law is not Law.SIGN or row.ratio != 1) and (row.push[k] != 0 or s in dict(row.sets))
-        ]
-        off = dict.fromkeys(edge.here[here:], sp.S.One)
-        if any(e.xreplace(off).has(edge.there[k]) for e in edge.rhs for k in changed):
-            raise ValueError(
-                f"tangent dynamics: found links of {', '.join(dict.fromkeys(str(node.state[k]) for k in changed))}, which "
-                "events change at once, so the order of simultaneous events matters; expected links of states that no event "
-                "changes"
-            )
+    for (target, source), edge in () if equations.joined else equations.edge_of:
+        node = equations.nodes[source]
+        _check_link(edge, equations.nodes[target], node, range(len(node.continuous)), node.rows)
+    part_of = {i: part for part in equations.parts for i in part.nodes}
+    for (target, source, *_), edge in equations.linked() if equations.joined else ():
+        part, node = part_of.get(source), equations.node_at(source)
+        if part is not None and part is not part_of.get(target):
+            places = [part.places.index(k) for k in equations.places[source][: len(node.continuous)]]
+            _check_link(edge, equations.node_at(target), node, places, part.template.rows)
+
+
+def _check_link(edge: Edge, target: Node, source: Node, places: Sequence[int], rows: Sequence[Row]) -> None:
+    """Raise ValueError for a link with a state of its source that `rows` change at once; `places`: its columns there."""
+    changed = [
+        k
+        for k, c in enumerate(places)
+        for row in rows
+        if (row.law is not Law.SIGN or row.ratio != 1) and (row.push[c] != 0 or source.state[k] in dict(row.sets))
+    ]
+    off = dict.fromkeys(edge.here[len(target.continuous) :], sp.S.One)
+    if any(e.xreplace(off).has(edge.there[k]) for e in edge.rhs for k in changed):
+        raise ValueError(
+            f"tangent dynamics: found links of {', '.join(dict.fromkeys(str(source.state[k]) for k in changed))}, which "
+            "events change at once, so the order of simultaneous events matters; expected links of states that no event "
+            "changes"
+        )
 
 
 def _check_springs(edges: Iterable[Edge]) -> None:
@@ -253,8 +276,15 @@ def of_network(equations: Equations, names: Sequence[str] = ()) -> Events | None
         return None
     if equations.has_rows:
         check_links_of_events(equations)
-        slots = [places[: len(equations.node.continuous)] for places in equations.places]
-        return of_rows(equations, range(n), slots, _pushes(equations), names)
+        groups = list(_groups(equations))
+        joined = {i for _, nodes, _, _ in groups for i in nodes}
+        apart = [
+            (-1, places[: len(equations.node_at(i).continuous)])
+            for i, places in enumerate(equations.places)
+            if i not in joined
+        ]
+        owners, slots = zip(*((group, places) for group, _, _, places in groups), *apart, strict=True)
+        return of_rows(equations, owners, slots, {} if equations.joined else _pushes(equations), names)
 
     def entries(i: int, side: _Release) -> tuple[Entry, ...]:
         slopes = (*((j, g) for j, g in enumerate(side.gradient)), *((2 * n + k, g) for k, g in by_names(side.limit)))

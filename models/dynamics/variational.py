@@ -186,11 +186,6 @@ def network_variation(equations: Equations, names: Sequence[str] = ()) -> Variat
     The deviations of the parameters `names` follow those of the states and stay constant. With set-valued friction the
     deviation of a velocity is relative to the ground, whose velocity may depend on the parameters: it is zero in stick.
     """
-    if equations.joined:
-        raise ValueError(
-            "variational equation of the whole network: found contacts or stops in links; expected events of nodes alone; compare "
-            "runs instead"
-        )
     equations.expect_alike("variational equation of the whole network", varied_too=True, layers_too=True)
     size = equations.continuous_dimension
     entries = {key: e for key, e in equations.jacobian().items() if max(key) < size}

@@ -234,7 +234,7 @@ CELL = sc.Field({V: A + sp.sin(T) / 3 - V}, events=[sc.Reset(V - B, {V: C})], pa
 def test_derivatives_of_a_network_through_events(node, coupling, start: list[float], time: float) -> None:
     """By the start and by parameters, beside differences of the motion; no two events at one instant."""
     names = ("a", "b", "c", *(["sigma"] if coupling else []))
-    size, state = len(start), np.array(start)
+    state = np.array(start)
     n = 2 if coupling else 1
     initial = {s: start[k * n : k * n + n] for k, s in enumerate(("x", "v") if coupling else ("v",))}
     scene = (
@@ -242,6 +242,12 @@ def test_derivatives_of_a_network_through_events(node, coupling, start: list[flo
         if coupling
         else sc.Scene(node, None, sc.graphs.chain(1), initial=initial, **FINE)
     )
+    expect_differences(scene, names, state, time)
+
+
+def expect_differences(scene: sc.Scene, names: tuple[str, ...], state: np.ndarray, time: float) -> None:
+    """Derivatives by the start and by parameters are those of differences of the motion."""
+    size = len(state)
     flow, length = flow_of(scene, scene.equations, names, state), np.array([time])
     image, step = flow.linearise(scene.parameters, state[None], length, np.ones(size)), 1e-6
 
@@ -256,6 +262,76 @@ def test_derivatives_of_a_network_through_events(node, coupling, start: list[flo
         assert image.columns[0][:, k] == pytest.approx(difference(name, np.zeros(size)), abs=1e-7)
     for k, direction in enumerate(np.eye(size)):
         assert image.propagators[0][:, k] == pytest.approx(difference(None, direction), abs=1e-7)
+
+
+PAIR, PAIRS = sc.graphs.chain(2), sc.graphs.from_edges([(0, 1), (2, 3)], n=4)
+BALL = sc.Lagrangian(
+    V**2 / 2, X**4 / 4, {X: A * sp.cos(R(13, 10) * T) / 2 - V / 10}, coordinates={X: V}, parameters={A: 1.0}
+)
+HIT = sc.Stop("x_j - x_i + 1/2", restitution="e")
+CRADLE = sc.Potential("k*W*(x_i - x_j)**2/2", {"k": 0.2, "e": 0.8}, events=[HIT])
+WITH_STOP = sc.Potential(
+    0, {"N": 0.3, "e": 0.7}, events=[sc.Friction("v_j - v_i", load="N", law=sc.friction_law("sign(w)")), HIT]
+)
+
+
+def rub(law: str, static: str | None = None) -> sc.Potential:
+    contact = sc.Friction("v_j - v_i", load="N", law=sc.friction_law(law, static=static))
+    return sc.Potential(0, {"N": 0.5}, events=[contact])
+
+
+JOINED = {
+    "a cradle of five": ([(CRADLE, sc.graphs.chain(5))], ("e", "k")),
+    "stick and slip of three blocks": ([(rub("sign(w)*(1 + 1/(1 + abs(w)))/2"), sc.graphs.chain(3)), ("damper", sc.graphs.ring(3))], ("N", "sigma")),
+    "a static drop": ([(rub("sign(w)", "6/5"), PAIR), ("spring", PAIR)], ("N", "sigma")),
+    "a static drop under springs of others": ([(rub("sign(w)", "6/5"), PAIRS), ("spring", sc.graphs.ring(4))], ("N", "sigma")),
+    "friction and a stop": ([(WITH_STOP, PAIR), ("damper", PAIR)], ("N", "e", "sigma")),
+    "two parts": ([(rub("sign(w)"), PAIRS), ("damper", sc.graphs.ring(4))], ("N", "sigma")),
+    "a ball beside a pair": ([(CRADLE, sc.graphs.from_edges([(0, 1)], n=3)), ("spring", sc.graphs.ring(3))], ("e", "sigma")),
+}  # fmt: skip
+
+
+def joined(links) -> sc.Scene:
+    n = links[0][1].n
+    start = {"x": [0.0, 0.3, 0.5, 0.2, 0.1][:n], "v": [0.6, -0.4, 0.1, 0.3, -0.2][:n]}
+    values = {"a": [1.5, -1.2, 0.4, 0.9, -0.7][:n], **({"sigma": 0.3} if len(links) > 1 else {})}
+    return sc.Scene(BALL, links=links, initial=start, parameters=values, time_unit="time", **FINE)
+
+
+@pytest.mark.parametrize("case", JOINED)
+def test_derivatives_through_events_of_links(case: str) -> None:
+    links, names = JOINED[case]
+    scene = joined(links)
+    state = np.array([*scene.initial["x"], *scene.initial["v"]])
+    expect_differences(scene, names, state, 8.0)
+
+
+def test_links_between_parts_of_states_that_an_impact_changes_are_refused() -> None:
+    links = [(CRADLE, sc.graphs.from_edges([(0, 1)], n=3)), ("damper", sc.graphs.ring(3))]
+    with pytest.raises(ValueError, match=r"found links of v, which events change at once.*; expected links of states"):
+        sc.lyapunov_spectrum(joined(links))
+
+
+def test_the_cycle_of_blocks_that_rub() -> None:
+    """The exponents of the network are those of the multipliers of its cycle; stick loses one direction."""
+    scene, period = joined([(rub("sign(w)"), PAIR), ("spring", PAIR)]).replace(a=[3.0, 0.6]), 2 * np.pi / 1.3
+    end = sc.run(scene.replace(window=60 * period, transient=0), workers=1, show_progress=False).end
+    near = scene.replace(initial={str(name): list(end.sel(component=name).values) for name in ("x", "v")})
+    orbit = sc.periodic_orbit(near, 1)
+    found = sc.lyapunov_spectrum(near, precision=0.5, periods=60, transient=30, show_progress=False).exponent
+    sizes = np.sort(np.abs(orbit.multipliers))[::-1]
+    assert np.log(sizes[:-1]) / period == pytest.approx(found[:-1], abs=1e-3)
+    assert (found[-1], sizes[-1]) == (-np.inf, pytest.approx(0.0, abs=1e-9))
+
+
+def test_impacts_between_balls_contract_areas() -> None:
+    """Each impact multiplies areas by e^2: the sum of the exponents is -2/10 + 2 log(e) times the rate of impacts."""
+    scene = joined([(CRADLE, PAIR)]).replace(a=[3.0, -3.0])
+    found = sc.lyapunov_spectrum(scene, precision=0.5, periods=80, transient=30, show_progress=False)
+    events = sc.run(scene.replace(window=500, transient=0, record=("events",)), workers=1, show_progress=False).events
+    impacts = int((events.event_time > 150).sum())
+    assert impacts > 60
+    assert found.exponent.sum() == pytest.approx(-0.2 + 2 * np.log(0.8) * impacts / 350, abs=3e-3)
 
 
 @pytest.mark.parametrize("damping", [R(1, 4), 3])

@@ -255,14 +255,6 @@ REFUSED = {
         lambda: sc.exponents(scene("harmonic", RUB, sc.graphs.ring(3), 1.0, "auto"), [0.1]),
         "friction in links holds equal oscillators together",
     ),
-    "spectrum": (
-        lambda: sc.lyapunov_spectrum(scene("harmonic", CRADLE, sc.graphs.chain(2), 1.0, "auto", initial={"x": [-1, 0]}), periods=10),
-        "found contacts or stops in links; expected events of nodes alone",
-    ),
-    "orbit": (
-        lambda: sc.periodic_orbit(scene("harmonic", CRADLE, sc.graphs.chain(2), 1.0, "auto", initial={"x": [-1, 0]})),
-        "found contacts or stops in links; expected events of nodes alone",
-    ),
     "closed": (lambda: sc.msf(scene("harmonic", CRADLE, sc.graphs.ring(3), 1.0, "auto"), [0.1]), "gap 0 between equal oscillators; expected a positive gap"),
     "open": (
         lambda: sc.msf(scene("harmonic", sc.Potential(0, events=[sc.Stop("x_j - x_i + 1")]), sc.graphs.ring(3), 1.0, "auto"), [0.1]),
