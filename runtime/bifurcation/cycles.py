@@ -75,6 +75,10 @@ ORIGIN = 1e-6
 RIGID = 1e-6
 """Part of the rates across the shifts below which a motion is a rigid rotation (a choice)."""
 
+SINGULAR = 1e-9
+"""Singular values of a matrix of Newton's method that count as zero, relative to the largest: a conservative motion is one
+of a family, to within the errors of the integration (a choice)."""
+
 CLOSE = 1e-9
 """A gap, in units of the motion, at which a step of Newton's method is not halved (a choice)."""
 
@@ -430,9 +434,8 @@ class Cycles:
                 # The ground carries the body along: follow the motion until the body slips.
                 z, best = np.append(image.states[0], z[n:]), math.inf
             else:
-                step = (
-                    linalg.lstsq(matrix[:, : len(weights)] / weights / sizes[:, None], -residual / sizes)[0] / weights
-                )
+                scaled = matrix[:, : len(weights)] / weights / sizes[:, None]
+                step = linalg.lstsq(scaled, -residual / sizes, cond=SINGULAR)[0] / weights
                 z = np.append(z[: len(weights)] + step, z[len(weights) :])
             steps += 1
             if not np.linalg.norm(self.weights * (z - self.point)) < ASTRAY:

@@ -14,7 +14,7 @@ Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (S
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 from numbers import Integral, Real
@@ -56,6 +56,12 @@ SEGMENTS = 4
 PARTS, FOLLOWED, SPANS, RECURRENCES = 32, 4, (0.7, 1.4), 3
 """Where Newton's method fails from a start, the motion is followed over FOLLOWED periods with PARTS states in each, and
 the RECURRENCES closest returns after SPANS of a period are tried (choices)."""
+
+STILL = 1e-3
+"""Least motion of an orbit in a period, by its rates, in units of the motion from the start (a choice)."""
+
+PARTS_OF_PERIOD = 1024
+"""Largest n for which period / n is tested as a period (a choice)."""
 
 REST = 1e-9
 """A motion rests if its rates are below their change over this part of its extent (a choice)."""
@@ -173,34 +179,40 @@ def periodic_orbit(
                 f"periods = {periods}; expected 1 for an oscillator without a drive, whose period is found"
             )
         if period is not None:
-            length = check_number("period", period, 0.0)
-            # Segments bend the orbit less, so that Newton's method comes from further away; a body may stick in one.
-            count = 1 if equations.sticks else SEGMENTS
-
-            def later(times: np.ndarray) -> np.ndarray:
-                return flow.advance(scene.parameters, np.tile(state, (len(times), 1)), times)
-
-            def solve(begin: float, span: float) -> tuple[Cycles, np.ndarray, float, int]:
-                times = begin + np.arange(count) * span / count
-                states = np.vstack([state, later(times[1:])]) if begin == 0.0 else later(times)
-                problem = Cycles.near(scene, (), classes, states, span, 0)
-                return problem, *problem.solved()
-
-            problem, z, gap, steps = solve(0.0, length)
-            if not _accepted(problem, z) and not equations.sticks:
-                # Newton's method from the start ends in a minimum of the residual: start where the motion nearly returns.
-                for begin, span in _recurrences(later, length):
-                    problem, z, other, steps = solve(begin, span)
-                    if _accepted(problem, z):
-                        break
-                    gap = min(gap, other)
-            if not _accepted(problem, z):
-                raise ArithmeticError(
-                    f"no orbit near the start with a period near {length:.6g}: the best residual was {gap:.1e}"
-                )
+            problem, z, steps = _near(scene, classes, flow, state, check_number("period", period))
         else:
             problem, z, steps = _cycle(scene, classes, flow, state)
     return _described(problem, problem.solution(Point(z, z, steps)), z)
+
+
+def _near(
+    scene: Scene, classes: tuple[int, ...], flow: Flow, state: np.ndarray, length: float
+) -> tuple[Cycles, np.ndarray, int]:
+    """Find an undriven orbit near a state and a period by Newton's method."""
+    if length <= 0.0:
+        raise ValueError(f"period = {length:g}; expected a number above 0")
+    # Segments bend the orbit less, so that Newton's method comes from further away; a body may stick in one.
+    count = 1 if flow.equations.sticks else SEGMENTS
+
+    def later(times: np.ndarray) -> np.ndarray:
+        return flow.advance(scene.parameters, np.tile(state, (len(times), 1)), times)
+
+    def starts() -> Iterator[tuple[float, float]]:
+        """Yield the start, and where Newton's method ends in a minimum of the residual, places of near returns."""
+        yield 0.0, length
+        yield from _recurrences(later, length) if count > 1 else ()
+
+    gap, moves = math.inf, True
+    for begin, span in starts():
+        times = begin + np.arange(count) * span / count
+        states = np.vstack([state, later(times[1:])]) if begin == 0.0 else later(times)
+        problem = Cycles.near(scene, (), classes, states, span, 0)
+        z, other, steps = problem.solved()
+        if _accepted(problem, z):
+            return *_least(problem, z), steps
+        gap, moves = min(gap, other), _moves(problem, z)
+    end = f"the best residual was {gap:.1e}" if moves else "Newton's method ended at rest"
+    raise ArithmeticError(f"no orbit near the start with a period near {length:.6g}: {end}; start nearer to the orbit")
 
 
 def _recurrences(later: Callable[[np.ndarray], np.ndarray], period: float) -> list[tuple[float, float]]:
@@ -354,14 +366,14 @@ def _cycle(scene: Scene, classes: tuple[int, ...], flow: Flow, state: np.ndarray
 def _least(problem: Cycles, z: np.ndarray) -> tuple[Cycles, np.ndarray]:
     """Return the orbit with its least period: test by one call whether a fraction of the period is one."""
     state, period = problem.states(z)[0], problem.period(z)
-    parts = np.arange(RETURNS, 1, -1)
+    parts = np.arange(PARTS_OF_PERIOD, 1, -1)
     later = problem.flow.advance(problem.values(z), np.tile(state, (len(parts), 1)), period / parts)
     for part, there in zip(parts.tolist(), later, strict=True):
-        if np.all(np.abs(there - state) <= math.sqrt(CLOSED) * problem.scale):
+        if np.all(np.abs(there - state - problem.turns / part) <= math.sqrt(CLOSED) * problem.scale):
             shorter = Cycles.near(problem.scene, (), problem.classes, state[None], period / part, 0)
             solved, _, _ = shorter.solved()
             if _accepted(shorter, solved) and abs(shorter.period(solved) * part - period) < NEAR * period:
-                return shorter, solved
+                return _least(shorter, solved)
     return problem, z
 
 
@@ -369,7 +381,14 @@ def _accepted(problem: Cycles, z: np.ndarray) -> bool:
     """Return whether Newton's method has found an orbit."""
     residual, _ = problem.linearise(z)
     gaps = residual[: problem.phase.size].reshape(problem.phase.shape)
-    return bool(np.isfinite(gaps).all()) and closed(gaps, CLOSED * problem.scale, problem.states(z))
+    found = bool(np.isfinite(gaps).all()) and closed(gaps, CLOSED * problem.scale, problem.states(z))
+    return found and _moves(problem, z)
+
+
+def _moves(problem: Cycles, z: np.ndarray) -> bool:
+    """Return whether an orbit without a drive moves in its period: every state is closed after no time, or at rest."""
+    rates = problem.flow.rates(problem.values(z), problem.states(z)) / problem.scale
+    return problem.periods > 0 or float(np.abs(rates).max()) * problem.period(z) > STILL
 
 
 def _described(problem: Cycles, orbit: PeriodicOrbit, z: np.ndarray) -> PeriodicOrbit:

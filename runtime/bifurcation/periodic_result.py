@@ -26,6 +26,10 @@ SAME = 1e-7
 ROUNDING = 10.0 * TOLERANCE
 """Largest error of the integration, relative to a state (a choice)."""
 
+NEUTRAL = 1e-9
+"""Largest distance of the modulus of a neutral multiplier from 1: errors of the integration decide no stability (a
+choice)."""
+
 LARGEST_LISTED = 6
 """Most multipliers in a summary."""
 
@@ -161,17 +165,17 @@ class PeriodicOrbit(Labelled):
     @property
     def stable(self) -> bool:
         """True if all multipliers lie inside the unit circle, but for the 1 of the motion and those of the shifts."""
-        return self.stable_along and bool(np.all(np.abs(self.across) < 1.0))
+        return self.stable_along and bool(np.all(np.abs(self.across) < 1.0 - NEUTRAL))
 
     @property
     def stable_along(self) -> bool:
         """True if the orbit is stable as long as clusters stay together."""
-        return bool(np.all(np.abs(self._others) < 1.0))
+        return bool(np.all(np.abs(self._others) < 1.0 - NEUTRAL))
 
     @property
     def growing(self) -> int:
         """Number of multipliers outside the unit circle, of differences within clusters too."""
-        return int((np.abs(np.append(self._others, self.across)) > 1.0).sum())
+        return int((np.abs(np.append(self._others, self.across)) > 1.0 + NEUTRAL).sum())
 
     @property
     def _others(self) -> np.ndarray:
@@ -185,22 +189,22 @@ class PeriodicOrbit(Labelled):
 
         A network is called stable only if all its multipliers are known.
         """
-        words = {True: "stable", False: "unstable"}
-        head = f"{self.pattern}; " if self.pattern else ""
+        head, along = f"{self.pattern}; " if self.pattern else "", _stability(self._others)
         if self.scene.n == 1:
-            return f"one oscillator: {words[self.stable]}"
+            return f"one oscillator: {along}"
         if not len(self.across):
-            return f"{head}{words[self.stable]}, by the multipliers of all {self.scene.n} nodes"
-        grown = np.abs(self.across) >= 1.0
-        size, number = f"{len(grown)} multipliers", int(grown.sum())
+            return f"{head}{along}, by the multipliers of all {self.scene.n} nodes"
+        word = _stability(self.across)
+        marked = np.abs(self.across) > (1.0 - NEUTRAL if word == "neutral" else 1.0 + NEUTRAL)
+        size, number = f"{len(marked)} multipliers", int(marked.sum())
         if self.modes != (WHOLE,):
             # A block has a multiplier for each component and each of its modes.
-            blocks = [grown[self.blocks == k] for k in range(len(self.modes))]
+            blocks = [marked[self.blocks == k] for k in range(len(self.modes))]
             copies = [len(block) // len(self.components) for block in blocks]
             size = f"{sum(copies)} modes"
             number = sum(count for count, block in zip(copies, blocks, strict=True) if block.any())
-        across = f"unstable in {number} of {size}" if number else f"stable in all {size}"
-        return f"{head}along itself {words[self.stable_along]}; across it {across}, largest {_largest(self.across)}"
+        across = f"{word} in {number} of {size}" if number else f"stable in all {size}"
+        return f"{head}along itself {along}; across it {across}, largest {_largest(self.across)}"
 
     @property
     def phases(self) -> Phases | None:
@@ -268,6 +272,12 @@ class PeriodicOrbit(Labelled):
                 f"multipliers: found a deviation that grows by exp({size:.3g}); expected exp(700) at most"
             )
         return sorted_by_size(np.linalg.eigvals(propagators[0, 0] * np.exp(size)))
+
+
+def _stability(multipliers: np.ndarray) -> str:
+    """Return "stable", "unstable" or "neutral" by the multipliers without those that are always 1."""
+    largest = float(np.abs(multipliers).max(initial=0.0))
+    return "stable" if largest < 1.0 - NEUTRAL else "unstable" if largest > 1.0 + NEUTRAL else "neutral"
 
 
 def sorted_by_size(multipliers: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.special import ellipk
 
 from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
@@ -105,6 +106,43 @@ def test_an_orbit_of_an_angle_passes_through_its_states_some_turns_away(turns: i
     assert not orbit.meets(orbit.state + np.array([2 * np.pi * turns, 0.0]))
 
 
+CIRCLE = Field({"x": "x*(1 - x**2 - y**2) - y", "y": "y*(1 - x**2 - y**2) + x"}, initial={"x": 1.1, "y": 0})
+
+
+@pytest.mark.parametrize("turns", [2, 3, 1501])
+def test_a_multiple_of_the_period_leads_to_the_period(turns: int) -> None:
+    orbit = periodic_orbit(Scene(CIRCLE, None), period=2 * np.pi * turns)
+    assert orbit.period == pytest.approx(2 * np.pi, abs=1e-11)
+    np.testing.assert_allclose(orbit.multipliers, [1.0, np.exp(-4 * np.pi)], atol=1e-10)
+
+
+def test_a_whole_turn_is_the_period_of_a_rotation() -> None:
+    """x'' = 3/2 - sin x - x'/2: the velocity decays at the rate 1/2."""
+    rotor = Scene(Field({"x": "v", "v": "3/2 - sin(x) - v/2"}, initial={"x": 0, "v": 3}), None)
+    orbit = periodic_orbit(rotor, period=6.3)
+    assert orbit.period == pytest.approx(periodic_orbit(rotor).period, abs=1e-11)
+    assert orbit.multipliers[1].real == pytest.approx(np.exp(-0.5 * orbit.period), abs=1e-10)
+
+
+@pytest.mark.parametrize(("start", "period"), [([0, 0], 6.0), ([1e-12, 0], 1e-3), ([1, 0], 1e-9), ([1, 0], 0.1)])
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+def test_rest_and_no_time_are_no_orbits(start: list[float], period: float, size: float) -> None:
+    rates = {"x": "x*(1 - (x**2 + y**2)/S**2) - y", "y": "y*(1 - (x**2 + y**2)/S**2) + x"}
+    scene = Scene(Field(rates, parameters={"S": size}), None)
+    with pytest.raises(ArithmeticError, match="no orbit near the start with a period near"):
+        periodic_orbit(scene, start=[size * x for x in start], period=period)
+
+
+def test_members_of_a_family_are_neutral_and_near_the_start() -> None:
+    pendulum = Scene(Field({"x": "v", "v": "-sin(x)"}, initial={"x": 1, "v": 0}), None)
+    orbit = periodic_orbit(pendulum, period=6.7)
+    assert orbit.period == pytest.approx(4 * ellipk(np.sin(0.5) ** 2), abs=1e-4)
+    assert np.abs(orbit.state[0]) == pytest.approx(1.0, abs=1e-3)
+    assert orbit.verdict == "one oscillator: neutral"
+    assert not orbit.stable
+    assert orbit.growing == 0
+
+
 @pytest.mark.long
 def test_a_period_doubling_is_found_where_the_double_period_is_born() -> None:
     first = periodic_orbit(scene().lone, 2, omega=1.2)
@@ -195,6 +233,11 @@ def test_what_is_refused() -> None:
     ("call", "kind", "message"),
     [
         (lambda s, o: periodic_orbit(s, 1.5), ValueError, "periods = 1.5; expected a whole number, at least 1"),
+        (
+            lambda s, o: periodic_orbit(Scene(CIRCLE, None), period=0),
+            ValueError,
+            "period = 0; expected a number above 0",
+        ),
         (lambda s, o: periodic_orbit(s, "2"), ValueError, "periods = '2'; expected a whole number"),
         (lambda s, o: periodic_orbit("figure_3"), TypeError, "'figure_3'.*expected a Scene"),
         (
