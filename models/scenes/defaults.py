@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import pkgutil
 import sys
-from collections.abc import Mapping, Sequence
-from functools import cache
-from itertools import chain, pairwise, product
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache, partial
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,9 @@ LIMITS: Mapping[str, tuple[Any, Any]] = {
     "rng": (0, SEED_LIMIT),
 }
 """The range of each keyword that is a number, both ends included."""
+
+MOST_COMPARED = 10**5
+"""Most cells of a grid of which all are compared with the ranges of events (a choice)."""
 
 SAMPLES = (401, 100, 20_001)
 """Default points of a trajectory: fewest, points per unit of time of the window, most (choices).
@@ -112,8 +116,7 @@ def complete(keywords: Mapping[str, Any]) -> dict[str, Any]:
     # Checks of several keywords together.
     values["continuation"] = check_sweep(model, values)
     check_draws(model, values, drawn)
-    check_friction(model, parameter_values, (*axes, *drawn), values["zipped"])
-    check_restitution(model, parameter_values, (*axes, *drawn))
+    check_events(model, parameter_values, (*axes, *drawn), values["zipped"])
     check_physics(model, parameter_values, (*axes, *drawn))
     return values
 
@@ -319,68 +322,80 @@ def _numerics(
     return {"integrator": integrator, "rtol": rtol, "atol": atol, "max_steps": max_steps, "samples": samples}
 
 
-def check_restitution(model: Model, parameter_values: Mapping[str, float], axes: Sequence[Axis]) -> None:
-    """Raise ValueError for a parameter as restitution that leaves 0 to 1 in a cell: rebounds would gain energy."""
-    swept = {axis.name: axis.values for axis in axes}
-    nodes = (
-        (kind.oscillator.model, names) for kind, names in at_nodes(model, {name: name for name in parameter_values})
+def _first_below(
+    values_of: Mapping[str, tuple[float, ...]],
+    zipped: bool,
+    high: sp.Expr,
+    low: sp.Expr,
+    names: Mapping[str, str],
+    slack: float = 0.0,
+) -> list[str] | None:
+    """Return high and low in the first cell with high < low, and where it is; None if there is no such cell."""
+    used = {s: names[s.name] for s in sorted(high.free_symbols | low.free_symbols, key=str)}
+    values = [values_of[name] for name in used.values()]
+    # Zipped axes value by value; of a grid all cells, or if they are many its corners.
+    cells: Iterable[tuple[float, ...]] = product(*values)
+    if zipped and len({len(v) for v in values} - {1}) == 1:
+        longest = max(map(len, values))
+        cells = zip(*(v * (longest // len(v)) for v in values), strict=True)
+    elif math.prod(map(len, values)) > MOST_COMPARED:
+        cells = product(*((min(v), max(v)) for v in values))
+    both = sp.lambdify(list(used), [high, low], "math")
+    for cell in cells:
+        try:
+            b, a = map(float, both(*map(float, cell)))
+        except (ArithmeticError, TypeError, ValueError):
+            continue  # no real number
+        if b < a * (1.0 - slack):
+            at = ", ".join(f"{name} = {value:.6g}" for name, value in zip(used.values(), cell, strict=True))
+            return [f"{b:.6g}", f"{a:.6g}", at and f" at {at}"]
+    return None
+
+
+def check_events(model: Model, parameter_values: Mapping[str, float], axes: Sequence[Axis], zipped: bool) -> None:
+    """Raise ValueError if in a cell a stop gains energy, or static friction is below the friction of slow slip."""
+    axis_values = {axis.name: tuple(axis.values) for axis in axes}
+    values_of = {name: (value,) for name, value in parameter_values.items()} | axis_values
+    first_below = partial(_first_below, values_of, zipped)
+    of_nodes: list[tuple[NodeKind, Mapping[str, str]]] = list(
+        at_nodes(model, {name: name for name in parameter_values})
     )
-    for part, names in chain(nodes, at_links(model, parameter_values)):
+    of_links: list[tuple[Any, Mapping[str, str]]] = list(at_links(model, parameter_values))
+    for part, names in [*((kind.oscillator.model, names) for kind, names in of_nodes), *of_links]:
         for each in (event for event in getattr(part, "events", ()) if isinstance(event, Stop)):
-            name = names.get(str(each.restitution))
-            for e in () if name is None else swept.get(name, (parameter_values[name],)):
-                if not 0.0 <= e <= 1.0:
-                    raise ValueError(
-                        f"stop {each.gap}: found the restitution {name} = {e!r}; expected a number from 0 to 1"
-                    )
+            e, one, zero = each.restitution, sp.S.One, sp.S.Zero
+            if not {s.name for s in e.free_symbols} <= names.keys():
+                continue
+            above = first_below(one, e, names)
+            if found := above or first_below(e, zero, names):
+                value, at = found[1 if above else 0], found[2]
+                text = e.xreplace({s: sp.Symbol(names[s.name]) for s in e.free_symbols})
+                raise ValueError(
+                    f"stop {each.gap}: found the restitution {text} = {value}{'' if e.is_Symbol else at}; expected a number "
+                    "from 0 to 1"
+                )
 
-
-def check_friction(model: Model, parameter_values: Mapping[str, float], axes: Sequence[Axis], zipped: bool) -> None:
-    """Raise ValueError if static friction is below the friction of slow slip in a cell: no motion would be possible."""
-    swept = {axis.name: axis.values for axis in axes}
-    nodes = (
+    laws: list[tuple[Any, Mapping[str, str]]] = [
         (law, names)
-        for kind, names in at_nodes(model, {name: name for name in parameter_values})
+        for kind, names in of_nodes
         if model.contact == ContactModel.SET_VALUED
         for law in (kind.friction, *kind.oscillator.laws.values())
-    )
-    links = (
-        (event.law, names)
-        for coupling, names in at_links(model, parameter_values)
-        for event in coupling.events
-        if isinstance(event, Friction)
-    )
-    for law, names in chain(nodes, links):
+    ]
+    laws += [(each.law, names) for part, names in of_links for each in part.events if isinstance(each, Friction)]
+    for law, names in laws:
         if not isinstance(law, FrictionLaw) or not law.parameters.keys() <= names.keys():
             continue  # no law, or parameters of a link that differ between nodes, which the equations refuse
         for pair in law.order:
             low, high = (names[name] for name in pair)
-            lows, highs = (swept.get(name, (parameter_values[name],)) for name in (low, high))
-            # On a grid compare the largest value of one with the smallest of the other; zipped axes value by value.
-            together = zipped and low in swept and high in swept
-            for a, b in zip(lows, highs, strict=True) if together else ((max(lows), min(highs)),):
-                if b < a:
-                    raise ValueError(
-                        f"friction {law}: found {high} = {b!r} below {low} = {a!r}; expected {low} <= {high}"
-                    )
+            if found := first_below(sp.Symbol(pair[1]), sp.Symbol(pair[0]), names):
+                raise ValueError(
+                    f"friction {law}: found {high} = {found[0]} below {low} = {found[1]}; expected {low} <= {high}"
+                )
         if (static := static_coefficient(law)) is not None:
             w = sp.Dummy("w", positive=True)
             slow = coefficient_at_rest(friction_coefficient(law, ContactModel.SET_VALUED)(w), w)
-            used = {s: names[s.name] for s in sorted(static.free_symbols | slow.free_symbols, key=str)}
-            values = [tuple(swept.get(name, (parameter_values[name],))) for name in used.values()]
-            longest = max(map(len, values), default=1)
-            # Zipped axes value by value; on a grid compare its corners, which suffice for monotone coefficients.
-            together = zipped and len({len(v) for v in values} - {1}) == 1
-            cells = (
-                zip(*(v * (longest // len(v)) for v in values), strict=True)
-                if together
-                else product(*((min(v), max(v)) for v in values))
-            )
-            for cell in cells:
-                b, a = (e.xreplace(dict(zip(used, map(sp.Float, cell), strict=True))).evalf() for e in (static, slow))
-                if b.is_real and a.is_real and b < a * (1 - 1e-12):
-                    at = ", ".join(f"{name} = {value:.6g}" for name, value in zip(used.values(), cell, strict=True))
-                    raise ValueError(
-                        f"friction {law}: found the static coefficient {float(b):.6g} below {float(a):.6g} of slow slip"
-                        f"{at and f' at {at}'}; expected at least as much"
-                    )
+            if found := first_below(static, slow, names, slack=1e-12):
+                raise ValueError(
+                    f"friction {law}: found the static coefficient {found[0]} below {found[1]} of slow slip{found[2]}; "
+                    "expected at least as much"
+                )

@@ -21,7 +21,7 @@ from synchain.models.dynamics.record import Record
 from synchain.models.inputs.checks import check_instance, check_number, listed, short_repr, suggestion
 from synchain.models.mechanics.parameter import Parameter
 from synchain.models.mechanics.physics import checked_parameters
-from synchain.models.scenes.defaults import check_friction, check_physics
+from synchain.models.scenes.defaults import check_events, check_physics
 from synchain.models.scenes.scene import Axis, Scene
 
 from ..cells.buffers import Buffers
@@ -277,7 +277,7 @@ class CompiledRun:
         if self._is_checked:
             model, axes = self.scene.model, [Axis(name, np.ravel(value)) for name, value in columns.items()]
             check_physics(model, planner.scene.parameters, axes)
-            check_friction(model, planner.scene.parameters, axes, zipped=False)
+            check_events(model, planner.scene.parameters, axes, zipped=False)
         # 3. Times of the window and of the drive, and slip states.
         spans = planner.spans_at(numbers) if self._moves_times else np.repeat(self._spans, cells, axis=0)
         return planner.started(start, numbers, spans), shape

@@ -75,6 +75,18 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: scene("harmonic", KNOCK, parameters={"e": 1.5}), r"stop .*: found the restitution e = 1\.5; expected a number"
     ),
     "one link above one": (lambda: scene("harmonic", KNOCK, axes={"e_1_2": [0.5, 1.25]}), r"found the restitution e_1_2 = 1\.25"),
+    "an expression above one": (
+        lambda: scene(body(sc.Stop(x, 2 * e), parameters={e: 0.25}), axes={"e": [0.25, 0.75]}),
+        r"stop x: found the restitution 2\*e = 1\.5 at e = 0\.75; expected a number",
+    ),
+    "an expression that peaks inside a grid": (
+        lambda: scene(body(sc.Stop(x, 5 * e * (1 - e)), parameters={e: 0.1}), axes={"e": [0, 0.5, 1]}),
+        r"= 1\.25 at e = 0\.5; expected a number from 0 to 1",
+    ),
+    "an expression of zipped axes below zero": (
+        lambda: scene(body(sc.Stop(x, e - c), parameters={e: 0.5, c: 0}), axes={"e": [0.2, 0.6], "c": [0.1, 0.7]}, zipped=True),
+        r"found the restitution -c \+ e = -0\.1 at c = 0\.7, e = 0\.6",
+    ),
     "static below kinetic": (
         lambda: scene(slider(force=sc.friction(-v), friction=WEAK)),
         r"friction weak: found the static coefficient 0\.3 below 0\.4 of slow slip at a = 0\.4, b = 0\.3; expected at least",

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import sympy as sp
 from event_reference import Reference
 from mpmath import mp, mpf
 
+import synchain as sc
 from synchain import Scene, run
 from synchain.graphs import Topology, topology
-from synchain.plugins import allow_code
 from synchain.results import Result, Status
 
 pytestmark = pytest.mark.long
@@ -175,20 +175,12 @@ def test_no_friction() -> None:
     np.testing.assert_allclose(ends(network)[:2], [0.3 * math.cos(37.0), -0.3 * math.sin(37.0)], rtol=0, atol=1e-10)
 
 
-def test_law_that_chatters_ends_with_its_status(tmp_path: Path) -> None:
-    """Static friction below that of slow slip can neither hold the block nor let it go."""
-    law = tmp_path / "weak_rest.py"
-    law.write_text(
-        "from synchain import friction_law\n"
-        "FRICTION = friction_law('mu_k*sign(w)', {'mu_k': 0.5, 'mu_s': 0.3}, static='mu_s')\n",
-        encoding="utf-8",
-    )
-    allow_code(law)
-    network = scene(ONE, [0.4], [0.0], 10.0, time_unit="time", friction=str(law),
-                 parameters={"theta_b": 0.0, "epsilon": 1.0, "u": 0.0})  # fmt: skip
-    result = run(network, show_progress=False, x_1=[0.4, 0.1], reduce=False)
+def test_a_guard_that_fires_without_end_ends_with_its_status() -> None:
+    x, a = sp.symbols("x a")
+    clock = sc.Field({x: 1}, parameters={a: 0}, events=[sc.Reset(x - 1, {x: a})])
+    network = sc.Scene(clock, topology=sc.graphs.chain(1), transient=0, window=3, time_unit="time", initial={"x": 0.5})
+    result = run(network, show_progress=False, a=[2.0, 0.0])
     assert list(result.status.values) == [Status.CHATTERING, Status.FINISHED]
-    assert "between stick and slip" in Status.CHATTERING.message
 
 
 # -- a second integrator ---------------------------------------------------------------------------------------
