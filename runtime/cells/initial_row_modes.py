@@ -38,7 +38,7 @@ def row_modes(equations: Equations, start: np.ndarray, parameters: np.ndarray, s
             level, speed = (_at(e, inside, (len(states), len(members))) for e in (row.level, row.speed))
             if row.law is not Law.RESET:
                 level, speed = (np.where(abs(e) <= slack, 0.0, e) for e in (level, speed))
-            _check_start(row, level, speed, members)
+            _check_start(row, level, speed, members, node.continuous)
             if row.law is Law.RESET:
                 continue
             at = slots[:, size + [b for b, _ in held].index(a)]
@@ -50,21 +50,35 @@ def row_modes(equations: Equations, start: np.ndarray, parameters: np.ndarray, s
     return states
 
 
-def _check_start(row: Row, level: np.ndarray, speed: np.ndarray, members: Sequence[int]) -> None:
-    """Raise ValueError for a start behind a stop or a guard."""
+WHERE = "in initial, an axis or ranges"
+"""Where starts are given."""
+
+
+def _check_start(
+    row: Row, level: np.ndarray, speed: np.ndarray, members: Sequence[int], states: Sequence[sp.Symbol]
+) -> None:
+    """Raise ValueError for a start behind a stop or a guard, or at a stop that closes."""
     behind = {
         Law.SIGN: np.zeros(level.shape, bool),
         Law.STOP: (level < 0.0) | ((level == 0.0) & (speed > 0.0)),
         Law.RESET: level >= 0.0,
     }[row.law]
-    if behind.any():
-        node = members[int(np.argwhere(behind)[0, 1])] + 1
-        what = (
-            f"the gap {row.level} closed, moving inwards"
-            if row.law is Law.STOP
-            else f"the guard {row.level} at or above 0"
-        )
-        raise ValueError(f"initial: found node {node} with {what}; expected a start in front of it; change the start")
+    if not behind.any():
+        return
+    first = tuple(np.argwhere(behind)[0])
+    what, expected, used = f"the guard {row.level} at or above 0", "a start in front of it", row.level.free_symbols
+    if row.law is Law.STOP:
+        what, expected = f"the gap {row.level} = {level[first]:.6g}", "0 or more"
+        if level[first] == 0.0:
+            what, expected = (
+                f"{what}, which closes at the speed {speed[first]:.6g}",
+                "an open gap, or one that does not close",
+            )
+            used = used | row.speed.free_symbols
+    changed = " or ".join(s.name for s in states if s in used)
+    raise ValueError(
+        f"start: found node {members[first[1]] + 1} with {what}; expected {expected}; change {changed} {WHERE}"
+    )
 
 
 def _decide(
@@ -100,7 +114,8 @@ def _decide_together(
         best = _agreeing(np.array(rate), np.array(ratio), stiffness, stops, states[cell, slots], free)
         if best is None:
             raise ValueError(
-                f"initial: found no single motion of {where} that agrees with its contacts or surfaces; change the start"
+                f"start: found no single motion of {where} that agrees with its contacts or surfaces; expected one; change "
+                f"the states {WHERE}"
             )
         states[cell, slots] = best
 
@@ -122,7 +137,7 @@ def _modes_of_parts(equations: Equations, states: np.ndarray, values: Values, sl
             level, speed = (_at(e, at, (len(states),)) for e in (row.level, row.speed))
             if row.law is not Law.RESET:
                 level, speed = (np.where(abs(e) <= slack, 0.0, e) for e in (level, speed))
-            _check_start(row, level[:, None], speed[:, None], [part.owners[a][0]])
+            _check_start(row, level[:, None], speed[:, None], [part.owners[a][0]], symbols)
             if row.law is Law.SIGN:
                 states[:, symbols.index(row.mode)] = np.where(level == 0.0, 0.0, np.sign(level))
             on = (level == 0.0) & (row.law is Law.SIGN or (speed == 0.0)) & (row.law is not Law.RESET)

@@ -248,7 +248,7 @@ REFUSED = {
     ),
     "start": (
         lambda: sc.run(scene(BLOCK, CRADLE, sc.graphs.chain(2), 1.0, "dop853", initial={"x": [1.0, 0.0]})),
-        "found node 2 with the gap",
+        "start: found node 2 with the gap -x_1 \\+ x_2 = -1; expected 0 or more; change x_1 or x_2 in initial, an axis or ranges",
     ),
     "msf": (lambda: sc.msf(scene("harmonic", RUB, sc.graphs.ring(3), 1.0, "auto"), [0.1]), "friction in links holds equal oscillators together"),
     "exponents": (
