@@ -38,6 +38,12 @@ def put(array, slot, lane, value):
     store(array, slot, select(one_lane(lane, WIDTH), broadcast(value, WIDTH), load(array, slot, WIDTH)))
 
 
+@njit(error_model="numpy", forceinline=True)
+def lane_room(dims):
+    """Return the number of slots behind the clock of a lane: state, parameters, what may repeat, impacts of rows."""
+    return 2 * dims.dimension + dims.parameters + len(REPEATING) + 2 * dims.rows
+
+
 @njit(error_model="numpy")
 def fill(lane, cell, rows, clock, y, dims):
     """Put a cell into a lane; a lane without a cell (cell < 0) idles on a copy of the first one."""
@@ -45,7 +51,7 @@ def fill(lane, cell, rows, clock, y, dims):
     spans, control = rows.spans, rows.control
     for slot in range(CLOCK):
         put(clock, slot, lane, 0.0)
-    for slot in range(2 * dims.dimension + dims.parameters + len(REPEATING)):
+    for slot in range(lane_room(dims)):
         put(y, slot, lane, 0.0)
     for c in range(dims.dimension):
         put(y, c, lane, rows.start[cell, c])

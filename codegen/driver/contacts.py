@@ -23,17 +23,40 @@ def gap_of(i, p, out, dims):
 
 
 @njit(error_model="numpy", forceinline=True)
-def smallest_gap(t, y, p, friction):
-    """Return the smallest gap of all contacts at a state."""
+def push(t, y, p, friction):
+    """Compute the numbers of all contacts at a state."""
     if LOOPED:
         graph, weights = friction.network
         friction.functions.pushes(t, y, p, friction.out, graph, weights)
     else:
         friction.functions.pushes(t, y, p, friction.out)
+
+
+@njit(error_model="numpy", forceinline=True)
+def smallest_gap(t, y, p, friction):
+    """Return the smallest gap of all contacts at a state."""
+    push(t, y, p, friction)
     least = broadcast(1e300, WIDTH)
     for i in range(friction.dims.nodes):
         least = minimum(least, gap_of(i, p, friction.out, friction.dims))
     return least
+
+
+@njit(error_model="numpy", forceinline=True)
+def scale_of(i, out, dims):
+    """Return the scale of a gap: 1."""
+    return broadcast(1.0, WIDTH)
+
+
+@njit(error_model="numpy", forceinline=True)
+def grown_scale(i, out, dims):
+    """Return the scale of a gap at a look: 1."""
+    return broadcast(1.0, WIDTH)
+
+
+@njit(error_model="numpy", forceinline=True)
+def clear_scales(friction):
+    """Do nothing: the scales are 1."""
 
 
 @njit(error_model="numpy")

@@ -14,7 +14,7 @@ from numba import njit
 
 from ..simd.addresses import address
 from ..simd.lanes import any_lane, broadcast, lane_bits, load, maximum, minimum, select, store
-from .cells import REPEATING, aligned, begin, fill, outcome, put, restart, turn_over, watch
+from .cells import aligned, begin, fill, lane_room, outcome, put, restart, turn_over, watch
 from .clock_slots import *
 from .contact_modes import begin_contacts, pass_events
 from .control import accept_series, advance, aim, arrive, judge, pause, wrap
@@ -269,14 +269,15 @@ def march(functions, dims, owners, first, last, inputs, deviations, outputs, pro
 
     # 1. Workspace of the orbit.
     size, kinds, contact_size = dims.dimension, dims.strengths, dims.contacts
-    lane_size, dense_size = CLOCK + 2 * size + dims.parameters + len(REPEATING), dims.dense_rows * size + dims.workspace
+    lane_size, dense_size = CLOCK + lane_room(dims), dims.dense_rows * size + dims.workspace
     block = aligned(lane_size + 2 * size + dense_size + contact_size + dims.shared + size + dims.rows)
     clock, y, y_new = address(block, 0), address(block, CLOCK), address(block, lane_size)
     middle, dense = address(y_new, size), address(y_new, 2 * size)
     out = address(dense, dense_size)
     shared = address(out, contact_size)
     slips = address(shared, dims.shared)
-    friction = EventWorkspace(middle, out, clock, address(control, 0), (), dims, functions)
+    impacts = address(y, lane_room(dims) - 2 * dims.rows)
+    friction = EventWorkspace(middle, out, clock, address(control, 0), (), dims, functions, impacts)
     orbit = Orbit(clock, y, y_new, dense, shared, slips, address(control, 0), friction)
 
     # 2. Workspace of the deviations, in registers.

@@ -1,6 +1,7 @@
 """Events inside a step: detection and location in time, for contacts (`contacts`) and rows (`rows`) alike.
 
-The gap of a contact or row (`gap_of`) is positive while it keeps its mode.  A step that would make a gap negative is
+The gap of a contact or row (`gap_of`) is positive while it keeps its mode.  Gaps are compared with a scale, the largest
+size of their terms at the looks into a step (`scale_of`): `smallest_gap` is the smallest ratio.  A step that would make a gap negative is
 taken back and tried again with the length after which the gap has just passed zero, until the passage lies at its end
 to within rounding.
 
@@ -14,11 +15,11 @@ import numpy as np
 from numba import njit
 
 from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, minimum, select, store
-from .clock_slots import ACCEPTED, N_POINTS, REJECTED, RUSH, STEP, STOP, WIDTH
-from .contacts import gap_inside, gap_of, smallest_gap
+from .clock_slots import ACCEPTED, N_POINTS, REJECTED, RUSH, STEP, STOP, UNTIL, WIDTH
+from .contacts import clear_scales, gap_inside, gap_of, grown_scale, push, scale_of
 
 # --- kernel text below ---
-# A gap this little below zero counts as zero; a passage is never sought closer than the shortest step to it.
+# A gap that is less than this part of its scale below zero counts as zero; a passage is never sought closer than the shortest step to it.
 PASSED, SHORTEST = 1e-13, 1e-13
 # Steps in which an event is looked for, equally spaced; a dip is followed to its bottom where a parabola through three
 # looks comes down to this part of the third.
@@ -33,9 +34,16 @@ def on_side(side, gap, out, dims):
 
 @njit(error_model="numpy", forceinline=True)
 def keep_gaps(look, p, out, dims):
-    """Store the gaps of all contacts at a look; those of three looks are stored."""
+    """Store the gaps of all contacts at a look, and let their scales grow; return the smallest gap.
+
+    The gaps of three looks are stored.
+    """
+    least = broadcast(1e300, WIDTH)
     for i in range(dims.rows):
-        store(out, (6 + look % 3) * dims.rows + i, gap_of(i, p, out, dims))
+        gap = gap_of(i, p, out, dims)
+        store(out, (6 + look % 3) * dims.rows + i, gap)
+        least = minimum(least, gap / grown_scale(i, out, dims))
+    return least
 
 
 @njit(error_model="numpy")
@@ -77,6 +85,7 @@ def first_dip(k, open_lanes, step, friction):
         if any_lane(dips):
             turn = minimum(maximum(span * (k - 1.0 - slope / bend), 0.0), 1.0)
             dip, least = bottom(i, turn, span, step, friction)
+            least = least / scale_of(i, out, dims)
             sunk = dips & (least < -PASSED) & (dip < first)
             first, depth = select(sunk, dip, first), select(sunk, least, depth)
     return first, depth
@@ -87,18 +96,18 @@ def first_passage(accept, step, friction):
     """Return the fraction of the step after which the first gap has just become negative; 2 in lanes where none does."""
     zero, span = broadcast(0.0, WIDTH), 1.0 / LOOKS
     low, high, f_low, f_high = zero, broadcast(2.0, WIDTH), zero, broadcast(-1.0, WIDTH)
-    earlier, before, open_lanes = zero, smallest_gap(step.t, step.y, step.y, friction), accept
+    clear_scales(friction)
+    push(step.t, step.y, step.y, friction)
     out, dims = friction.out, friction.dims
     side = load(out, 9 * dims.rows + 1, WIDTH)
-    keep_gaps(0, step.y, out, dims)
+    earlier, before, open_lanes = zero, keep_gaps(0, step.y, out, dims), accept
     for k in range(1, LOOKS + 1):
         theta = broadcast(k * span, WIDTH)
         if k == LOOKS:
-            gap = smallest_gap(step.t + step.h, step.y_new, step.y, friction)
+            push(step.t + step.h, step.y_new, step.y, friction)
         else:
-            gap = gap_inside(theta, step, friction)
-        gap = on_side(side, gap, out, dims)
-        keep_gaps(k, step.y, out, dims)
+            gap_inside(theta, step, friction)
+        gap = on_side(side, keep_gaps(k, step.y, out, dims), out, dims)
         hit = open_lanes & (gap < -PASSED)
         f_low, low = select(hit, maximum(before, 0.0), f_low), select(hit, theta - span, low)
         f_high, high = select(hit, gap, f_high), select(hit, theta, high)
@@ -165,9 +174,15 @@ def note_events(lanes, time, cell, counts, points, friction):
 
 
 @njit(error_model="numpy", forceinline=True)
+def shortest(t, clock):
+    """Return the shortest step to an event."""
+    return SHORTEST * maximum(t, minimum(load(clock, UNTIL, WIDTH), 1.0))
+
+
+@njit(error_model="numpy", forceinline=True)
 def note_rush(accept, t, h, clock):
     """Count the steps in a row that take no time."""
-    short, rush = h <= 100.0 * SHORTEST * maximum(t, 1.0), load(clock, RUSH, WIDTH)
+    short, rush = h <= 100.0 * shortest(t, clock), load(clock, RUSH, WIDTH)
     store(clock, RUSH, select(accept, select(short, rush + 1.0, 0.0), rush))
 
 
@@ -176,7 +191,7 @@ def take_back(accept, step, clock, friction):
     """Reject the steps that pass an event before their end, and aim at it; return the other accepted lanes."""
     t, h = step.t, step.h
     theta = first_passage(accept, step, friction)
-    least = SHORTEST * maximum(t, 1.0)
+    least = shortest(t, clock)
     wanted = maximum(theta * h, least)
     # behind a jump a gap is closed to the end of the step, however near it is
     early = accept & (theta < 1.5) & (t + wanted < t + h) & (h > 2.0 * least)

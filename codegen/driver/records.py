@@ -49,6 +49,9 @@ class EventWorkspace(NamedTuple):
     network: Any  # arrays of links and their weights; () if the step is written out
     dims: Any
     functions: Any  # `pushes`; of rows `strike` too
+    impacts: (
+        Any  # address: of each row the largest speed at impacts since its stop closed, then the largest acceleration
+    )
 
 
 class Zeros(NamedTuple):

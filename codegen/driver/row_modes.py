@@ -9,7 +9,7 @@ from numba import njit
 from ..simd.lanes import any_lane
 from .cells import put
 from .clock_slots import *
-from .rows import GAP, LAW, MODE, NUMBER, OF_SIGN, RATIO, change_modes, number, smallest_gap
+from .rows import GAP, LAW, MODE, NUMBER, OF_SIGN, RATIO, change_modes, number, push
 
 # --- kernel text below ---
 
@@ -38,7 +38,7 @@ def pass_events(accept, t, strengths, old, active, modes, orbit, dims, functions
     """
     y, out, last, drop, kind = orbit.y, orbit.friction.out, -1.0, False, -1.0
     if any_lane(accept):
-        smallest_gap(t, y, y, orbit.friction)
+        push(t, y, y, orbit.friction)
         for row in range(dims.rows):
             orbit.slips[dims.dimension + row] = 0.0
             if number(GAP, row, 0, out, dims) <= 0.0:

@@ -8,9 +8,10 @@ are put on their surfaces, here and after each step.  If friction does not drop 
 set is the only one if K is a P-matrix (Samelson, Thrall & Wesler, Proc. AMS 9, 805 (1958); Cottle, Pang & Stone, The
 Linear Complementarity Problem (Academic Press, 1992), chapter 3).  Else the cell ends as AMBIGUOUS.
 
-A stop whose rebounds would end soon is closed at once.  After a rebound with the speed u against the acceleration a the
-remaining ones take the time 2 u/(a (1 - e)) and pass on the same momentum as one plastic impact; the error is of the
-order u**3/(a**2 (1 - e)), which must be below atol, or the height u**2/(2 a) of the rebound below FLAT (Budd & Dux, Phil. Trans. R. Soc. A 347, 365 (1994)).
+A stop closes when its rebounds have become LOWEST times as high as the first ones, in any unit.  After a rebound with the
+speed u against the acceleration a the remaining ones take the time 2 u/(a (1 - e)) and pass on the same momentum as one
+plastic impact (Budd & Dux, Phil. Trans. R. Soc. A 347, 365 (1994)).  The first ones are as high as u**2/(2 a) for the
+largest u and the largest a at impacts since the stop was last closed.
 """
 
 from __future__ import annotations
@@ -20,14 +21,14 @@ import math
 import numpy as np
 from numba import njit
 
-from ..simd.lanes import any_lane, broadcast, lane_bits, load, minimum, store
+from ..simd.lanes import any_lane, broadcast, lane_bits, load, maximum, minimum, store
 from .cells import put
 from .clock_slots import *
 from .dense import inside
 
 # --- kernel text below ---
 # Groups of `pushes` and `strike`: six in front of the looks, the others behind the numbers on jumps in time.
-LEVEL, GAP, MODE, SPEED, RATE, RATIO, LAW, NUMBER, K = 0, 1, 2, 3, 4, 5, 9, 10, 11
+LEVEL, GAP, MODE, SPEED, RATE, RATIO, LAW, NUMBER, SIZE, K = 0, 1, 2, 3, 4, 5, 9, 10, 11, 12
 OF_SIGN, OF_STOP, OF_RESET = 0.0, 1.0, 2.0
 # What an event means for a row: nothing, its mode is known, it is decided, it lets go to the side of its force.
 UNTOUCHED, KNOWN, OPEN, RELEASED = 0.0, 1.0, 2.0, 3.0
@@ -35,8 +36,10 @@ UNTOUCHED, KNOWN, OPEN, RELEASED = 0.0, 1.0, 2.0, 3.0
 ROLE, BEFORE, SPEED_BEFORE, X, SHUT = 0, 1, 2, 3, 4
 # A pivot, or a change of a speed, this much smaller than what it is the difference of is zero.
 NONE = 1e-12
-# A rebound of this height is about as small as a step sees.
-FLAT = 1e-12
+# The part of the terms of a gap with which it is compared: PASSED (passages.py) of it are 7 rounding errors of the terms.
+PART = 1.0 / 64.0
+# Height of the last rebound of a stop over that of the first ones (a choice).
+LOWEST = 1e-12
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -56,12 +59,34 @@ def push(t, y, p, friction):
 
 
 @njit(error_model="numpy", forceinline=True)
+def scale_of(i, out, dims):
+    """Return the scale of a gap."""
+    return load(out, place(K + dims.felt + 3, i, dims), WIDTH)
+
+
+@njit(error_model="numpy", forceinline=True)
+def grown_scale(i, out, dims):
+    """Return the scale of a gap at a look, which is at least a part of the terms of the gap, and store it."""
+    scale = maximum(scale_of(i, out, dims), PART * load(out, place(SIZE, i, dims), WIDTH))
+    store(out, place(K + dims.felt + 3, i, dims), scale)
+    return scale
+
+
+@njit(error_model="numpy", forceinline=True)
+def clear_scales(friction):
+    """Let the scales of gaps begin anew in a step."""
+    for i in range(friction.dims.rows):
+        store(friction.out, place(K + friction.dims.felt + 3, i, friction.dims), broadcast(1e-300, WIDTH))
+
+
+@njit(error_model="numpy", forceinline=True)
 def smallest_gap(t, y, p, friction):
-    """Return the smallest gap of all rows at a state."""
+    """Return the smallest gap of all rows at a state, each in parts of its scale."""
     push(t, y, p, friction)
     least = broadcast(1e300, WIDTH)
     for i in range(friction.dims.rows):
-        least = minimum(least, gap_of(i, p, friction.out, friction.dims))
+        gap = gap_of(i, p, friction.out, friction.dims)
+        least = minimum(least, gap / scale_of(i, friction.out, friction.dims))
     return least
 
 
@@ -289,57 +314,71 @@ def decide(notes, lane, first, size, friction):
 @njit(error_model="numpy")
 def begin_event(notes, lane, first, size, friction):
     """Note what an event means for the rows of a node, and set the impulses of stops; 2 if ambiguous, 1 if speeds jump."""
-    out, dims, felt = friction.out, friction.dims, friction.dims.felt
+    out, dims = friction.out, friction.dims
     modes, x, chosen = np.empty(size), np.empty(size), np.zeros(size, np.bool_)
+    speeds, hit, outcome = np.empty(size), np.zeros(size, np.bool_), 0
     for a in range(size):
         modes[a] = number(MODE, first + a, lane, out, dims)
         chosen[a] = modes[a] == 0.0
     hold(modes, chosen, x, lane, first, size, out, dims)
-    jumps = 0
     for a in range(size):
         row = first + a
         law, shut = number(LAW, row, lane, out, dims), number(GAP, row, lane, out, dims) <= 0.0
-        notes[row, BEFORE], notes[row, SPEED_BEFORE], notes[row, X] = (
-            modes[a],
-            number(SPEED, row, lane, out, dims),
-            x[a],
-        )
+        speeds[a] = number(SPEED, row, lane, out, dims)
+        notes[row, BEFORE], notes[row, SPEED_BEFORE], notes[row, X] = modes[a], speeds[a], x[a]
         notes[row, SHUT] = 1.0 if shut else 0.0
         if chosen[a]:
             notes[row, ROLE] = RELEASED if shut else OPEN
         else:
             notes[row, ROLE] = OPEN if shut and law == OF_SIGN else KNOWN
         if shut and law == OF_RESET:
-            put(out, place(K + felt + 2, row, dims), lane, 1.0)
-            jumps = max(jumps, 1)
-        if shut and law == OF_STOP and not chosen[a]:
-            speed, stiff = notes[row, SPEED_BEFORE], number(K + a, row, lane, out, dims)
-            put(out, place(K + felt + 1, row, dims), lane, -number(LEVEL, row, lane, out, dims) / stiff)
-            e, jumps = number(RATIO, row, lane, out, dims), max(jumps, 1)
-            inward = number(RATE, row, lane, out, dims)
+            put(out, place(K + dims.felt + 2, row, dims), lane, 1.0)
+            outcome = 1
+        hit[a] = shut and law == OF_STOP and not chosen[a]
+    for a in range(size):
+        if hit[a]:
+            outcome = max(outcome, 1)
             for b in range(size):
-                inward -= number(K + b, row, lane, out, dims) * x[b]
                 other = b != a and number(LAW, first + b, lane, out, dims) == OF_STOP
-                hit = number(GAP, first + b, lane, out, dims) <= 0.0 or modes[b] == 0.0
-                if other and hit and number(K + b, row, lane, out, dims) != 0.0:
-                    jumps = 2
-            if ends_soon(e * speed, inward, e, friction.control[ATOL]):
-                e = 0.0
-            if e == 0.0:
-                notes[row, ROLE] = OPEN
-            if speed > 0.0:
-                put(out, place(K + felt, row, dims), lane, (1.0 + e) * speed / stiff)
-    return jumps
+                if other and (hit[b] or chosen[b]) and number(K + b, first + a, lane, out, dims) != 0.0:
+                    outcome = 2
+    if outcome == 1:
+        rebound(notes, hit, speeds, x, lane, first, size, friction)
+    return outcome
 
 
-@njit(error_model="numpy", forceinline=True)
-def ends_soon(speed, inward, e, atol):
-    """Return True if a stop rebounds so slowly that it may close: what is lost is below the tolerance."""
-    if not (inward > 0.0 and e < 1.0):
-        return False
-    if speed * speed < 2.0 * FLAT * inward:
-        return True
-    return speed < math.sqrt(atol) and speed * speed * speed < atol * inward * inward * (1.0 - e)
+@njit(error_model="numpy")
+def rebound(notes, hit, speeds, x, lane, first, size, friction):
+    """Set the impulses of the stops that are hit, and put their gaps to zero."""
+    out, dims, impacts = friction.out, friction.dims, friction.impacts
+    for a in range(size):
+        if not hit[a]:
+            continue
+        row = first + a
+        level, stiff, e = (
+            number(LEVEL, row, lane, out, dims),
+            number(K + a, row, lane, out, dims),
+            number(RATIO, row, lane, out, dims),
+        )
+        put(out, place(K + dims.felt + 1, row, dims), lane, -level / stiff)
+        if speeds[a] < 0.0:
+            continue
+        inward = number(RATE, row, lane, out, dims)
+        for b in range(size):
+            inward -= number(K + b, row, lane, out, dims) * x[b]
+        # The speed at the gap 0, a depth before: energy is kept although the gap is put to zero.
+        speed = math.sqrt(max(speeds[a] * speeds[a] + 2.0 * inward * level, 0.0))
+        after = e * speed
+        hardest = max(impacts[row * WIDTH + lane], speed)
+        strongest = max(impacts[(dims.rows + row) * WIDTH + lane], abs(inward))
+        # heights after**2/(2 inward) and hardest**2/(2 strongest)
+        if inward > 0.0 and e < 1.0 and after * after * strongest <= LOWEST * hardest * hardest * inward:
+            after = 0.0
+        if after == 0.0:
+            notes[row, ROLE], hardest, strongest = OPEN, 0.0, 0.0
+        put(impacts, row, lane, hardest)
+        put(impacts, dims.rows + row, lane, strongest)
+        put(out, place(K + dims.felt, row, dims), lane, (speeds[a] + after) / stiff)
 
 
 @njit(error_model="numpy")
@@ -459,6 +498,7 @@ def change_modes(moved, t, y, friction):
     """
     if not any_lane(moved):
         return 0
+    clear_scales(friction)
     events = lane_bits(moved & (smallest_gap(t, y, y, friction) <= 0.0))
     clear_impulses(friction)
     notes = np.zeros((WIDTH, friction.dims.rows, 5))

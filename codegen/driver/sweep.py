@@ -12,7 +12,7 @@ from numba import njit
 
 from ..simd.addresses import address
 from ..simd.lanes import any_lane, lane_bits, load, minimum, store
-from .cells import REPEATING, aligned, come_back, fill, finish, outcome, put, settle_down, turn_over, vacate
+from .cells import aligned, come_back, fill, finish, lane_room, outcome, put, settle_down, turn_over, vacate
 from .clock_slots import *
 from .contacts import change_modes
 from .control import accept_series, advance, aim, arrive, judge, pause, wrap
@@ -138,7 +138,7 @@ def drive(functions, dims, multiplicity, rule, network, first, last, inputs, out
 
     # 1. Lay out the workspace: y_new, middle, contacts, clock, y, dense output, values of observables and of sections.
     size, dense_size = dims.dimension, dims.dense_rows * dims.dimension
-    lane_size = CLOCK + 2 * size + dims.parameters + len(REPEATING)
+    lane_size = CLOCK + lane_room(dims)
     observed = len(rule) * (dims.observed + dims.gaps + dims.depths)
     crossed = (len(rule) + 1) * (dims.sections * (3 + max(0, dims.kept)) + 3 * dims.stops)
     block = aligned((2 * size + lane_size + dense_size + dims.workspace + dims.contacts + observed + crossed) * WIDTH)
@@ -148,7 +148,8 @@ def drive(functions, dims, multiplicity, rule, network, first, last, inputs, out
     dense = address(block, first_lane + lane_size * WIDTH)
     seen = address(dense, (dense_size + dims.workspace) * WIDTH)
     crossings = address(seen, observed * WIDTH)
-    friction = EventWorkspace(middle, out, clock, steering, network, dims, functions)
+    impacts = address(y, (lane_room(dims) - 2 * dims.rows) * WIDTH)
+    friction = EventWorkspace(middle, out, clock, steering, network, dims, functions, impacts)
 
     # 2. All lanes are empty; tallies of cells that do not continue begin at 0.
     cell = np.full(WIDTH, -1)

@@ -2,7 +2,8 @@
 
 The functions below the mark are the text of exported Python modules; `in_c` (c_functions.py) translates them to C.
 They decide as the kernels do (codegen/driver/rows.py and passages.py, which give the sources).  `pushes` writes
-GROUPS numbers for each row: those named LEVEL … NUMBER, then those of the event, IMPULSE … SHUT, and the entries of K.
+GROUPS numbers for each row: those named LEVEL … NUMBER, then those of the event, IMPULSE … SHUT, the size of the terms of
+the gap, its largest value in a step, the hardest impact since the stop closed, and the entries of K.
 """
 
 from __future__ import annotations
@@ -33,11 +34,12 @@ def strike(t: float, state: Doubles, numbers: Doubles, rows: Doubles) -> None:
 
 # --- exported text below ---
 LEVEL, GAP, MODE, SPEED, RATE, RATIO, LAW, NUMBER = 0, 1, 2, 3, 4, 5, 6, 7
-IMPULSE, LIFT, FIRES, ROLE, BEFORE, SPEED_BEFORE, X, SHUT, K = 8, 9, 10, 11, 12, 13, 14, 15, 16
+IMPULSE, LIFT, FIRES, ROLE, BEFORE, SPEED_BEFORE, X, SHUT = 8, 9, 10, 11, 12, 13, 14, 15
+SIZE, SCALE, HARDEST, STRONGEST, K = 16, 17, 18, 19, 20
 OF_SIGN, OF_STOP, OF_RESET = 0, 1, 2
 UNTOUCHED, KNOWN, OPEN, RELEASED = 0, 1, 2, 3
 FINISHED, AMBIGUOUS, CHATTERING, NO_STEP = 0, 1, 2, 3
-PASSED, SHORTEST, NONE, FLAT = 1e-13, 1e-13, 1e-12, 1e-12
+PASSED, SHORTEST, NONE, LOWEST, PART = 1e-13, 1e-13, 1e-12, 1e-12, 0.015625
 
 
 def eliminated(matrix: Doubles, right: Doubles, modes: Doubles, size: int) -> float:
@@ -203,7 +205,7 @@ def decide(first: int, size: int, rows: Doubles) -> int:
     return matches > 0 if drops == 1 else matches == 1
 
 
-def rebound(modes: Doubles, x: Doubles, atol: float, a: int, first: int, size: int, rows: Doubles) -> int:
+def rebound(modes: Doubles, x: Doubles, a: int, first: int, size: int, rows: Doubles) -> int:
     """Note the impulse of a stop by Newton's law; return 0 if a stop is hit that feels another one."""
     at = (first + a) * GROUPS
     speed = rows[at + SPEED]
@@ -217,22 +219,25 @@ def rebound(modes: Doubles, x: Doubles, atol: float, a: int, first: int, size: i
         hit = rows[other + GAP] <= 0.0 or modes[b] == 0.0
         if b != a and rows[other + LAW] == OF_STOP and hit and rows[at + K + b] != 0.0:
             good = 0
-    # a stop closes when what its further rebounds do is below the tolerance (Budd & Dux 1994)
-    after = e * speed
-    if inward > 0.0 and e < 1.0:
-        lost = after * after * after
-        small = after < math.sqrt(atol) and lost < atol * inward * inward * (1.0 - e)
-        if small or after * after < 2.0 * FLAT * inward:
-            e = 0.0
-    if e == 0.0:
-        rows[at + ROLE] = OPEN
-    if speed > 0.0:
-        rows[at + IMPULSE] = (1.0 + e) * speed / stiff
     rows[at + LIFT] = -rows[at + LEVEL] / stiff
+    if speed < 0.0:
+        return good
+    # the speed at the gap 0; a stop closes when its rebounds have become LOWEST times as high as the first ones
+    touch = math.sqrt(max(speed * speed + 2.0 * inward * rows[at + LEVEL], 0.0))
+    after = e * touch
+    hardest = max(rows[at + HARDEST], touch)
+    strongest = max(rows[at + STRONGEST], abs(inward))
+    if inward > 0.0 and e < 1.0 and after * after * strongest <= LOWEST * hardest * hardest * inward:
+        after = 0.0
+    rows[at + HARDEST] = hardest if after > 0.0 else 0.0
+    rows[at + STRONGEST] = strongest if after > 0.0 else 0.0
+    if after == 0.0:
+        rows[at + ROLE] = OPEN
+    rows[at + IMPULSE] = (speed + after) / stiff
     return good
 
 
-def begin_event(atol: float, first: int, size: int, rows: Doubles) -> int:
+def begin_event(first: int, size: int, rows: Doubles) -> int:
     """Note what an event means for the rows of a node, and the impulses of its stops; return AMBIGUOUS or FINISHED."""
     modes = np.empty(size)
     x = np.empty(size)
@@ -253,7 +258,7 @@ def begin_event(atol: float, first: int, size: int, rows: Doubles) -> int:
         if shut and rows[at + LAW] == OF_RESET:
             rows[at + FIRES] = 1.0
         hit = shut and rows[at + LAW] == OF_STOP and modes[a] != 0.0
-        if hit and rebound(modes, x, atol, a, first, size, rows) == 0:
+        if hit and rebound(modes, x, a, first, size, rows) == 0:
             outcome = AMBIGUOUS
     return outcome
 
@@ -339,7 +344,7 @@ def settle(t: float, state: Doubles, numbers: Doubles, rows: Doubles) -> int:
     return outcome
 
 
-def change_modes(t: float, state: Doubles, numbers: Doubles, atol: float, rows: Doubles) -> int:
+def change_modes(t: float, state: Doubles, numbers: Doubles, rows: Doubles) -> int:
     """Let rows with closed gaps rebound, reset, be held, slip or open; keep held rows on their surfaces."""
     outcome = FINISHED
     events = 0
@@ -357,7 +362,7 @@ def change_modes(t: float, state: Doubles, numbers: Doubles, atol: float, rows: 
                 closed = 1
         if closed == 1:
             events = 1
-            if begin_event(atol, first, size, rows) != FINISHED:
+            if begin_event(first, size, rows) != FINISHED:
                 outcome = AMBIGUOUS
         else:
             project_held(first, size, rows)
@@ -439,7 +444,7 @@ def path_of(h: float, state: Doubles, end: Doubles, k: Doubles, path: Doubles) -
 
 
 def gap_inside(theta: float, t: float, h: float, path: Doubles, numbers: Doubles, rows: Doubles) -> float:
-    """Compute the numbers of all rows at a fraction of the step; return the smallest gap."""
+    """Compute the numbers of all rows at a fraction of the step; return the smallest gap over its scale."""
     middle = np.empty(DIMENSION)
     for c in range(DIMENSION):
         inner = 0.0
@@ -449,7 +454,9 @@ def gap_inside(theta: float, t: float, h: float, path: Doubles, numbers: Doubles
     pushes(t + theta * h, middle, numbers, rows)
     least = 1e300
     for row in range(EVENT_ROWS):
-        least = min(least, rows[row * GROUPS + GAP])
+        at = row * GROUPS
+        rows[at + SCALE] = max(rows[at + SCALE], PART * rows[at + SIZE])
+        least = min(least, rows[at + GAP] / rows[at + SCALE])
     return least
 
 
@@ -508,6 +515,8 @@ def narrowed(low: float, high: float, t: float, h: float, path: Doubles, numbers
 def passage(t: float, h: float, path: Doubles, numbers: Doubles, rows: Doubles) -> float:
     """Return the fraction of the step behind which the first gap has just closed; 2 if none closes."""
     gaps = np.empty(3 * EVENT_ROWS)
+    for row in range(EVENT_ROWS):
+        rows[row * GROUPS + SCALE] = 1e-300
     high = 2.0
     for look in range(5):
         theta = 0.25 * look
@@ -525,7 +534,7 @@ def passage(t: float, h: float, path: Doubles, numbers: Doubles, rows: Doubles) 
             slope = 0.5 * (last - earlier)
             if abs(slope) < 0.999 * bend and before - 0.5 * slope * slope / bend < 0.2 * last:
                 dip = bottom(row, theta - 0.25 - 0.25 * slope / bend, t, h, path, numbers, rows)
-                if rows[row * GROUPS + GAP] < -PASSED:
+                if rows[row * GROUPS + GAP] < -PASSED * rows[row * GROUPS + SCALE]:
                     high = min(high, dip)
         if high < 1.5:
             low = max(0.0, high - 0.25)
@@ -543,6 +552,9 @@ def run(start: float, stop: float, state: Doubles, numbers: Doubles, rtol: float
     end = np.empty(DIMENSION)
     path = np.empty(8 * DIMENSION)
     rows = np.empty(EVENT_ROWS * GROUPS)
+    for row in range(EVENT_ROWS):
+        rows[row * GROUPS + HARDEST] = 0.0
+        rows[row * GROUPS + STRONGEST] = 0.0
     t = start
     h = 0.001 * (stop - start)
     aim = stop - start
@@ -554,7 +566,7 @@ def run(start: float, stop: float, state: Doubles, numbers: Doubles, rtol: float
             for c in range(DIMENSION):
                 k[c] = first[c]
             renewed = 1
-        least = SHORTEST * max(1.0, abs(t))
+        least = SHORTEST * max(min(1.0, stop - start), abs(t))
         taken = min(h, min(aim, stop - t))
         stages(t, taken, state, numbers, k, end)
         error = error_of(taken, state, end, k, rtol, atol)
@@ -582,7 +594,7 @@ def run(start: float, stop: float, state: Doubles, numbers: Doubles, rtol: float
         aim = stop - t
         rush = rush + 1 if taken <= 100.0 * least else 0
         renewed = 0
-        outcome = change_modes(t, state, numbers, atol, rows)
+        outcome = change_modes(t, state, numbers, rows)
         for row in range(EVENT_ROWS):
             changed = rows[row * GROUPS + BEFORE] != rows[row * GROUPS + MODE]
             if seen and (changed or rows[row * GROUPS + SHUT] != 0.0):

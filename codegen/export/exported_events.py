@@ -99,7 +99,7 @@ class EventText:
                     sp.Integer(a),
                 )
                 at = (first + a) * self.groups
-                table |= {at + group: e for group, e in enumerate(numbers)}
+                table |= {at + group: e for group, e in enumerate(numbers)} | {at + event_text.SIZE: row.size}
                 stiffness = dict(zip(map(id, held), row.stiffness, strict=True))
                 table |= {at + event_text.K + b: stiffness.get(id(other), sp.S.Zero) for b, other in enumerate(rows)}
             statements.append(self.block(f"rows of oscillator {i + 1}", table, "rows_"))

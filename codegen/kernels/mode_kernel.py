@@ -125,7 +125,7 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
             strengths=len(variation.parameters),
             shared=shared,
             jumps=int(events is not None and bool(events.exits)),
-            rows=row_count(plain) if rows else plain.n,
+            rows=row_count(plain),
             felt=most_rows(plain) if rows else 0,
             contacts=contact_groups(plain),
         ),

@@ -133,7 +133,7 @@ def emit(
     # stage 6: events and observed values, constants, sizes
     written = row_functions if plain.has_rows else push_functions
     events = [*written(plain, names, looped), *recording.functions(named)]
-    rows, felt = (row_count(plain), most_rows(plain)) if plain.has_rows else (plain.n if plain.sticks else 0, 0)
+    rows, felt = row_count(plain), most_rows(plain) if plain.has_rows else 0
     functions += [driver.text("driver.dense")] if recording.has_functions else []
     functions += [driver.text("driver.slope")] if recording.has_rates else []
     constants = {

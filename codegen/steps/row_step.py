@@ -6,10 +6,11 @@
     1  gap              3  speed, held at zero           5  ratio: static over kinetic friction, or restitution
 
 The driver stores three more groups behind these six, and two numbers on jumps and kinks in time follow (contact_step.py).
-Behind them are groups of numbers that decide on modes: the law of the row, its number among the rows of its node, and
-its entries of K in the columns of these rows.  `strike(t, y, p, out)` adds impulses to the states of the nodes, corrects gaps,
-resets states, and stores the modes of group 2.  It reads three groups that the driver stores behind those of K: the
-impulse of each row, the correction of its gap, and 1 where a guard fires.
+Behind them are groups of numbers that decide on modes: the law of the row, its number among the rows of its node, the
+size of the terms of its gap, and its entries of K in the columns of these rows.  `strike(t, y, p, out)` adds impulses to
+the states of the nodes, corrects gaps, resets states, and stores the modes of group 2.  It reads three groups that the
+driver stores behind those of K: the impulse of each row, the correction of its gap, and 1 where a guard fires.  In a
+further group the driver stores the largest size of each gap in a step.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.saltation import Events
 from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import Edge, Node
-from synchain.models.mechanics.rows import Law, Row, forces, struck
+from synchain.models.mechanics.rows import Law, Row, forces, struck, term_size
 
 from ..program.expressions import Compare, Expression, Load, Name, Number, call, plus
 from ..program.lowering import lower
@@ -57,10 +58,13 @@ def contact_groups(equations: Equations) -> int:
     if not equations.has_rows:
         return (SIDES * equations.n + 2) * equations.sticks
     rows = row_count(equations)
-    return SIDES * rows + 2 + (5 + most_rows(equations)) * rows
+    return SIDES * rows + 2 + (7 + most_rows(equations)) * rows
 
 
 def row_count(equations: Equations) -> int:
+    """Return the number of contacts, or of rows of all nodes and links."""
+    if not equations.has_rows:
+        return equations.n * equations.sticks
     return sum(map(len, _all_rows(equations)))
 
 
@@ -178,8 +182,8 @@ class _WrittenOut(_Writer):
                 mode = sp.S.One if row.law is Law.RESET else row.mode
                 columns += (row.level, row.gap, mode, row.speed, row.rate, row.ratio)
                 places += [self.place(k, number) for k in range(6)]
-                columns += (sp.Integer(LAWS[row.law]), sp.Integer(a), *_full(group.rows, row))
-                places += [self.behind(k, number) for k in range(2 + len(group.rows))]
+                columns += (sp.Integer(LAWS[row.law]), sp.Integer(a), row.size, *_full(group.rows, row))
+                places += [self.behind(k, number) for k in range(3 + len(group.rows))]
         return columns, places
 
     def of_parts(self, sides: Sequence[sp.Expr], ends: Sequence[Expression]) -> tuple[set[sp.Symbol], list[Statement]]:
@@ -214,7 +218,7 @@ class _WrittenOut(_Writer):
                 triple = tuple(islice(self.supply, 3))
                 numbers.append(triple)
                 loads += [
-                    let(s.name, Load("out", self.behind(2 + self.most + k, number))) for k, s in enumerate(triple)
+                    let(s.name, Load("out", self.behind(3 + self.most + k, number))) for k, s in enumerate(triple)
                 ]
             after = struck(group.rows, group.state, numbers)
             columns += [e.xreplace(dict(group.values)) for e, s in zip(after, group.state, strict=True) if e != s]
@@ -290,8 +294,8 @@ class _Looped(_Writer):
         for a, row in enumerate(node.rows):
             columns += [row.level, sp.S.One if row.law is Law.RESET else row.mode, row.speed, row.rate, row.ratio]
             places += [self.place(group, self.row(number, a)) for group in (LEVEL, MODE, SPEED, RATE, RATIO)]
-            columns += [sp.Integer(LAWS[row.law]), sp.Integer(a), *_full(node.rows, row)]
-            places += [self.behind(group, self.row(number, a)) for group in range(2 + len(node.rows))]
+            columns += [sp.Integer(LAWS[row.law]), sp.Integer(a), term_size(row.level), *_full(node.rows, row)]
+            places += [self.behind(group, self.row(number, a)) for group in range(3 + len(node.rows))]
         symbols, stores = self.stored("out", columns, places)
         used |= symbols
         loop = [*self.states(node, symbols, "p"), *self.layout.own(symbols), *stores]
@@ -346,27 +350,26 @@ class _Looped(_Writer):
         rates = [number_of(self.place(RATE, self.row(number, a))) for a in held]
         stiffness = [
             tuple(
-                e if e.is_number else number_of(self.behind(2 + b, self.row(number, a)))
+                e if e.is_number else number_of(self.behind(3 + b, self.row(number, a)))
                 for b, e in zip(held, node.rows[a].stiffness, strict=True)
             )
             for a in held
         ]
         x = dict(zip(held, forces([node.rows[a].law for a in held], modes, stiffness, rates), strict=True))
-        columns = []
+        columns, places = [], []
         for a, row in enumerate(node.rows):
-            level = number_of(self.place(LEVEL, self.row(number, a)))
-            ratio = number_of(self.place(RATIO, self.row(number, a)))
-            zeros = (sp.S.Zero,)
+            at, zeros = self.row(number, a), (sp.S.Zero,)
+            level, ratio, size = map(number_of, (self.place(LEVEL, at), self.place(RATIO, at), self.behind(2, at)))
             mode = modes[held.index(a)] if a in x else row.mode
-            columns.append(
-                Row(
-                    row.law, mode, level, level, level, zeros, zeros, zeros, ratio, x.get(a, sp.S.Zero), zeros, zeros
-                ).gap
+            at_numbers = Row(
+                row.law, mode, level, level, level, zeros, zeros, zeros, ratio, x.get(a, sp.S.Zero), zeros, zeros
             )
+            columns += [at_numbers.gap, at_numbers.size.xreplace({abs(level): size})]
+            places += [self.place(GAP, at), self.behind(2, at)]
         body = share(columns, self.names.fresh("z"))
         loop: list[Statement] = [let(s.name, e) for s, e in stored.items() if s in body.symbols]
         loop += assigned(body)
-        loop += [store("out", self.place(GAP, self.row(number, a)), lower(e)) for a, e in enumerate(body.results)]
+        loop += [store("out", place, lower(e)) for place, e in zip(places, body.results, strict=True)]
         return [self.span_of(number).over(loop)]
 
     def strike(self) -> list[Statement]:
@@ -382,7 +385,7 @@ class _Looped(_Writer):
             used |= body.symbols
             loop = [*self.states(node, body.symbols, "y"), *self.layout.own(body.symbols)]
             loop += [
-                let(s.name, Load("out", self.behind(2 + self.most + k, self.row(number, a))))
+                let(s.name, Load("out", self.behind(3 + self.most + k, self.row(number, a))))
                 for a, triple in enumerate(numbers)
                 for k, s in enumerate(triple)
                 if s in body.symbols

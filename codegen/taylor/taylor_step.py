@@ -50,7 +50,7 @@ COUNTED = re.compile(r"[rs]\d+$")
 
 ARGUMENTS = ("t", "h", "scale", "y", "p", "y_new", "dense", "rtol", "atol")
 
-SOONEST = let("nearest", 1e-13 * call("maximum", "t", 1.0) / "scale")
+SOONEST = let("nearest", 1e-13 * call("maximum", "t", "scale") / "scale")
 """Least step to a contact or a jump: about 450 rounding errors of the time, so that time advances; a choice."""
 
 LEAST_ORDER = 6

@@ -61,7 +61,7 @@ class Stop:
     """A stop that a body hits: its gap stays positive or zero.
 
     At an impact the rate of the gap changes its sign and is multiplied by the restitution (Newton's law).  A stop whose
-    rebounds would end within the tolerance of the run closes; it then presses on the body until the pressure is zero.
+    rebounds are 1e-12 times as high as the first ones closes; it then presses on the body until the pressure is zero.
 
     Parameters
     ----------

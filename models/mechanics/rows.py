@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 
 import sympy as sp
 
@@ -109,6 +110,14 @@ class Row:
             return (off + held * self.x,)
         return off + held * (self.ratio - self.x), off + held * (self.ratio + self.x)
 
+    @property
+    def size(self) -> sp.Expr:
+        """An expression as large as the terms of the gap, of which the rounding error of the gap is a small part."""
+        off, held, level = abs(self.mode), 1 - self.mode**2, term_size(self.level)
+        if self.law is Law.RESET:
+            return level
+        return off * level + held * (term_size(self.x) + (self.ratio if self.law is Law.SIGN else 0))
+
     def gained(self, force: Sequence[sp.Expr]) -> Column:
         """Return what further rates of the continuous states add to the gaps."""
         x = (1 - self.mode**2) * sp.Add(*(a * b for a, b in zip(self.answer, force, strict=True)))
@@ -137,6 +146,12 @@ class Row:
         """Return the row with further rates of the continuous states."""
         rate = self.rate + sp.Add(*(a * b for a, b in zip(self.gradient, force, strict=True)))
         return replace(self, rate=rate, x=self.x + sp.Add(*(a * b for a, b in zip(self.answer, force, strict=True))))
+
+
+@lru_cache(maxsize=4096)
+def term_size(e: sp.Expr) -> sp.Expr:
+    """Return an expression with the modulus of each term in place of the term."""
+    return e.func(*map(term_size, e.args)) if isinstance(e, sp.Add | sp.Mul) else abs(e)
 
 
 def with_rows(

@@ -13,6 +13,7 @@ from synchain.codegen.driver.cells import REPEATING
 from synchain.codegen.driver.columns import Control, Count, SumColumn
 from synchain.codegen.integrators import Integrator
 from synchain.codegen.machine_code.compile import Kernel, load
+from synchain.codegen.steps.row_step import row_count
 from synchain.models.dynamics.equations import Equations
 from synchain.models.scenes.scene import Scene
 
@@ -157,8 +158,8 @@ def run_rows(kernel: Kernel, rows: CellRows, control: np.ndarray, buffers: Buffe
 
 
 def lane_size(equations: Equations) -> int:
-    """Return the size of a cell's lane: clock, state, parameters, and the state saved for the search for repetition."""
-    return slot.CLOCK + 2 * equations.dimension + len(equations.parameters) + len(REPEATING)
+    """Return the size of a cell's lane: clock, state, parameters, the state saved for the search for repetition, impacts."""
+    return slot.CLOCK + 2 * equations.dimension + len(equations.parameters) + len(REPEATING) + 2 * row_count(equations)
 
 
 def hand_over(lanes: np.ndarray, cells: np.ndarray, length: np.ndarray, ladder: Ladder, method: np.ndarray) -> None:

@@ -186,7 +186,13 @@ def test_what_is_no_event(make, message: str) -> None:
         sc.Lagrangian(V**2 / 2, Y, coordinates={Y: V}, events=[make()])
 
 
-@pytest.mark.parametrize(("start", "message"), [(-0.1, "gap y_1 closed|gap y closed"), (0.0, "moving inwards")])
+@pytest.mark.parametrize(
+    ("start", "message"),
+    [
+        (-0.1, "found node 1 with the gap y = -0.1; expected 0 or more; change y in initial"),
+        (0.0, "gap y = 0, which closes at the speed 1; expected an open gap, .*; change y or v in"),
+    ],
+)
 def test_a_start_behind_a_stop(start: float, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         end(scene(BALL, 1.0, "taylor", initial={"y": [start], "v": [-1.0]}))
@@ -225,3 +231,26 @@ def test_impacts_do_not_depend_on_the_unit_of_length(unit: float) -> None:
         return found.events.event_time.values.ravel()
 
     np.testing.assert_allclose(impacts(unit), impacts(1.0), rtol=1e-5)
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize(
+    ("length", "time"), [(1e-12, 1.0), (1e-12, 1e-6), (1e-9, 1e-9), (1e-6, 1.0), (1.0, 1e3), (1e6, 1e3), (1e12, 1.0)]
+)
+def test_a_ball_rests_after_as_many_impacts_in_any_unit(integrator: str, length: float, time: float) -> None:
+    """g = 1, e = 9/10: the rebound after impact 132 is the first one below 1e-12 of the height of the drop."""
+    ball = sc.Lagrangian(V**2 / 2, length / time**2 * Y, coordinates={Y: V}, events=[sc.Stop(Y, R(9, 10))])
+    drop = scene(ball, 30.0 * time, integrator, initial={"y": [length]}, record=["events"], rtol=1e-9, atol=None)
+    found = sc.run(drop, workers=1, show_progress=False)
+    times = found.events.event_time.values.ravel()
+    assert np.isfinite(times).sum() == 132
+    assert np.nanmax(times) / time == pytest.approx(np.sqrt(2) * (19 - 18 * 0.9**131), rel=1e-9)
+    assert not found.data["end"].values.any()
+
+
+@pytest.mark.parametrize(("integrator", "error"), [("taylor", 1e-13), ("dop853", 1e-11)])
+def test_elastic_impacts_keep_the_energy(integrator: str, error: float) -> None:
+    """10 000 impacts of a ball, each of which is noticed a rounding error below the table."""
+    drop = scene(BALL, 20_000 * np.sqrt(2 / 9.81), integrator, initial={"y": [1.0]}, max_steps=10**6)
+    y, v, _ = end(drop, e=[1.0]).ravel()
+    assert v**2 / 2 / 9.81 + y == pytest.approx(1.0, abs=error)
