@@ -24,8 +24,6 @@ from .part_claims import verify_parts
 
 @dataclass(frozen=True, slots=True)
 class ClaimVerdict:
-    """The result of comparing a claim with the spectrum of its graph."""
-
     claim: Claim
     problems: tuple[str, ...]  # a sentence for each error
     proved: bool = True  # False if a closed form was used without proof

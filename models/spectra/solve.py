@@ -92,7 +92,6 @@ def _candidate(pair: tuple[sp.Expr, int], simple: bool) -> Eigenvalue:
 
 
 def _with_blocks(graph: Matrix, pair: tuple[sp.Expr, int]) -> Eigenvalue:
-    """Make an eigenvalue of a closed form and compute its Jordan blocks."""
     number, count = sp.sympify(pair[0]), pair[1]
     if count == 1 or graph.diagonalisable:
         return _candidate(pair, graph.diagonalisable)

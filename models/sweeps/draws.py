@@ -94,7 +94,6 @@ def _graphs_of(drawn: Mapping[str, Draws]) -> Graphs | RandomGraph:
 
 
 def _realised(graphs: Graphs | RandomGraph, count: int, rng: int) -> Graphs:
-    """Return the graphs of all realisations: the listed graphs, or random graphs."""
     return graphs.graphs(count, rng) if isinstance(graphs, RandomGraph) else graphs
 
 

@@ -92,7 +92,6 @@ class _Table:
 
 
 def _at_nodes(model: Model, name: str, values: Iterable[float]) -> dict[Place, float]:
-    """Return the value of a parameter at each node that has the parameter."""
     return {NodeName(name, i): value for i, value in zip(model.holders(name), values, strict=True)}
 
 

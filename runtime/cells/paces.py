@@ -291,7 +291,6 @@ def _flat(block: Block) -> tuple[sp.Expr, ...]:
 
 
 def _of_nodes(equations: Equations, slots: dict[str, int], name: str, nodes: list[int]) -> Column:
-    """Return the column of a parameter, or its columns at some nodes."""
     if name not in equations.varied:
         return slots[name]
     return np.array([slots[str(NodeName(name, i))] for i in nodes])

@@ -136,7 +136,6 @@ class ReducedScene:
             )
 
     def rows(self, rows: CellRows) -> CellRows:
-        """Convert rows of the unreduced network to rows of the reduced network."""
         start, parameters = rows.start, rows.numbers
         if not self.merge.merges and len(self.numbers) == parameters.shape[1]:
             return rows
@@ -152,7 +151,6 @@ class ReducedScene:
 
 
 def as_reduction(scene: Scene, reduce: bool | ReducedScene, starts: np.ndarray | None = None) -> ReducedScene:
-    """Return the reduction of a scene for the argument `reduce` of `run`."""
     check_scene(scene)
     if not isinstance(reduce, ReducedScene):
         return reduce_scene(scene, check_flag("reduce", reduce), starts=starts)
@@ -220,7 +218,6 @@ def _fixed(scene: Scene) -> dict[str, float]:
 
 
 def _observed_parameters(scene: Scene, recording: Recording) -> set[str]:
-    """Return the parameters that occur in observables and in sections on functions."""
     names = {s.name for value in (*recording.observed, *recording.events) for s in value.free_symbols}
     names = names.union(*(rows.names for rows in recording.sums))
     of_nodes = {str(NodeName(name, i)) for name in scene.equations.varied if name in names for i in range(scene.n)}
@@ -266,7 +263,6 @@ def _without(equations: Equations, name: str, value: Fraction) -> Equations:
 
 
 def _present(scene: Scene, equations: Equations) -> list[str]:
-    """Return sentences about the forcing and the links that are integrated."""
     sentences = ["forcing: time occurs in the equations"] if equations.forced else []
     if equations.link_count:
         fixed = _fixed(scene)

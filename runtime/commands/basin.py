@@ -79,7 +79,6 @@ def _node(text: str) -> int | str:
 
 
 def execute(arguments: Namespace) -> int:
-    """Print the shares with their intervals, and how the starts ended."""
     from ..synchronisation.basin import basin
 
     with wrong_use():

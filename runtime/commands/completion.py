@@ -46,7 +46,6 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Print the script; the names in it are those of this installation."""
     import shtab
 
     from synchain.models.scenes.file import scene_names

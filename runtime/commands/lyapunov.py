@@ -36,7 +36,6 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Print the exponents with their errors, and the Kaplan-Yorke dimension."""
     from ..stability.lyapunov import lyapunov_spectrum
 
     with wrong_use():

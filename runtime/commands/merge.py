@@ -22,7 +22,6 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Check the parts, write and draw the result, and print how the cells ended."""
     from pathlib import Path
 
     from ..support.files import output_folder

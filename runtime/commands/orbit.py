@@ -29,7 +29,6 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Print the orbit with its multipliers, or the branch with its bifurcations."""
     from ..bifurcation.branches import follow
     from ..bifurcation.periodic import periodic_orbit
 

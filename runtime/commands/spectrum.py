@@ -118,7 +118,6 @@ def execute(arguments: Namespace) -> int:
 
 
 def _letters(arguments: Namespace) -> int:
-    """Print the spectrum of a matrix of letters, or for numbers in their place."""
     from synchain.models.graphs.symbolic import read_symbols
     from synchain.models.spectra.spectrum import table
 

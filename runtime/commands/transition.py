@@ -18,7 +18,6 @@ OPTIONS = ("alpha", "precision", "periods", "starts", "workers")  # keywords of 
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the scene, the strengths of modes and the length of the average."""
     add_changed_scene(parser)
     parser.add_argument(
         "--alpha",
@@ -41,7 +40,6 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Print a line for each step, with the clusters that form or dissolve."""
     from ..synchronisation.transition import transition
 
     with wrong_use():

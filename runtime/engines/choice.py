@@ -95,7 +95,6 @@ class Ladder:
         return Templates(self.equations)
 
     def first(self, rows: CellRows) -> np.ndarray:
-        """Return the index (cells,) of the method with which each cell begins."""
         if len(self.methods) == 1:
             return np.zeros(len(rows), int)
         if self.scene.cells > 1:

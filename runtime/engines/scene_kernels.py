@@ -65,7 +65,6 @@ def ladder_of(reduction: ReducedScene) -> Ladder:
 
 
 def chosen_integrator(reduction: ReducedScene) -> Integrator:
-    """Return the integrator with which most of a sample of cells begin."""
     return ladder_of(reduction).main(reduction.rows(reduction.planner.sample()))
 
 

@@ -75,7 +75,6 @@ class FigureRuns:
         return future.result()
 
     def run(self, scene: Scene) -> Result:
-        """Run a scene over its axes, thinned to the number of values of the quality."""
         scene = thin(scene, self.quality.points).replace(title="")
         return self.once(("run", scene), lambda: run(scene, **self.options))
 
@@ -126,5 +125,4 @@ def thin(scene: Scene, points: int | None) -> Scene:
 
 
 def _with_couplings(scene: Scene, highest: float, count: int) -> Scene:
-    """Return a scene with an axis of `count` couplings sigma from 0 to `highest`."""
     return scene.replace(axes=(Axis.between("sigma", 0.0, highest, count),))

@@ -253,7 +253,6 @@ def _space(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) 
 
 
 def _network(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
-    """Draw the graph with its nodes coloured by their first state at the end."""
     states = node_states(data.end, result, 0)
     draw_graph(result.scene.topology, axes, states.values.astype(float), **style)
     axes.figure.axes[-1].set_ylabel(f"{symbols(states)} at the end")

@@ -53,7 +53,6 @@ class EnergyFunction:
     groups: tuple[_Members, ...]
 
     def __call__(self, states: Array, t: Array | float = 0.0, parameters: Values = None) -> Array:
-        """Return the energy (…) of the states at times (…) or at one time."""
         return self._sum(False, states, t, parameters)
 
     def power(self, states: Array, t: Array | float = 0.0, parameters: Values = None) -> Array:

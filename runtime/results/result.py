@@ -141,7 +141,6 @@ class Result(_Deferred, HasAnimation, Labelled):
         return f"{text}; methods of its dataset: result.data.{name}(…)" if method else f"{text}; its dataset is .data"
 
     def __getitem__(self, name: str | Sequence[str]) -> Any:
-        """Return the variable or coordinate of a name, or the dataset of several names."""
         names = [name] if isinstance(name, str) else name
         missing = next((each for each in names if each not in self.data), None)
         if missing is not None:

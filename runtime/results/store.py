@@ -298,7 +298,6 @@ def _first(data: xr.Dataset, long: Collection[str]) -> xr.Dataset:
 
 
 def copy_in_pieces(data: xr.Dataset, long: Collection[str], arrays: Mapping[str, Any]) -> None:
-    """Copy the variables that have a long dimension into arrays of their shapes."""
     for name in _with(data, long):
         variable, array = data.variables[name], arrays[name]
         for piece in pieces(variable.shape):

@@ -154,7 +154,6 @@ def expect_whole_periods(planner: Planner) -> None:
 
 
 def _check_labels(scene: Scene, end: xr.DataArray) -> None:
-    """Raise ValueError if the labels are not those of one cell of the scene."""
     further = [f"{name} ({end.sizes[name]})" for name in end.dims if name not in STATE]
     if further:
         axis = next(name for name in end.dims if name not in STATE)

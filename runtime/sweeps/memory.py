@@ -63,12 +63,10 @@ class Memory:
         return done
 
     def missing(self, block: int) -> np.ndarray:
-        """Return the numbers of the cells of a block that have not finished."""
         rows = self.layout.rows(block)
         return np.asarray(rows[~self.buffers.finished[rows]])
 
     def ends(self, block: int) -> Start:
-        """Return the final states of a block, and whether each of its cells finished."""
         rows = self.layout.rows(block)
         return self.buffers.end[rows], self.buffers.finished[rows]
 

@@ -330,7 +330,6 @@ class _Disk(Sink):
     log: BlockLog
 
     def ends(self, block: int) -> Start:
-        """Return the final states of a block, and which of its cells finished."""
         buffers = self.log.read(block)
         return buffers.end, buffers.finished
 
