@@ -79,6 +79,14 @@ def known_length(values: object) -> int:
     return size if isinstance(size, int) and 0 < size <= LIMIT else 1
 
 
+def thinned(axis: Axis, most: int | None) -> Axis:
+    """Return an axis with at most `most` of its values, evenly spread and with both ends; None keeps all values."""
+    if most is None or len(axis) <= most:
+        return axis
+    last = len(axis) - 1
+    return Axis(axis.name, [axis.values[round(k * (last / (most - 1)))] for k in range(most)])
+
+
 def _spaced(first: Fraction, last: Fraction, count: int) -> Iterator[float]:
     """Yield equally spaced values; integers over one denominator, so that each value is rounded only once."""
     base = first.denominator * last.denominator

@@ -13,7 +13,7 @@ import numpy as np
 
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
-from synchain.models.sweeps.axis import Axis
+from synchain.models.sweeps.axis import Axis, thinned
 
 from ..prediction.intervals import Interval, scale
 from ..results.result import Result
@@ -114,14 +114,7 @@ class FigureRuns:
 
 def thin(scene: Scene, points: int | None) -> Scene:
     """Reduce each axis of a scene to at most `points` values, including both ends; None keeps all values."""
-    if points is None:
-        return scene
-    axes = []
-    for axis in scene.axes:
-        last = len(axis) - 1
-        indices = np.unique(np.round(np.linspace(0, last, min(points, last + 1))).astype(int))
-        axes.append(Axis(axis.name, [axis.values[k] for k in indices]))
-    return scene.replace(axes=axes)
+    return scene.replace(axes=[thinned(axis, points) for axis in scene.axes])
 
 
 def _with_couplings(scene: Scene, highest: float, count: int) -> Scene:

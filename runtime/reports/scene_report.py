@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from functools import partial
 from html import escape
 
-import numpy as np
-
 from synchain.models.presentation.equations_text import latex
 from synchain.models.scenes.scene import Scene, check_scene
-from synchain.models.sweeps.axis import Axis
+from synchain.models.sweeps.axis import thinned
 
 from ..engines.job import versions
 from ..engines.scene_kernels import kernel_source
@@ -71,13 +69,13 @@ def report(
         parts += [_section("Master stability function", _stability(scene, effort, workers, show_progress))]
     if scene.axes:
         # Run the sweep of the scene, thinned to the values of the effort, and return it as HTML.
-        thinned = scene.replace(axes=tuple(_thinned(axis, effort.values) for axis in scene.axes))
-        result = run(thinned, workers=workers, show_progress=show_progress)
+        coarse = scene.replace(axes=tuple(thinned(axis, effort.values) for axis in scene.axes))
+        result = run(coarse, workers=workers, show_progress=show_progress)
         plain = [None] if not scene.observe or {"sync_error", "section"} & set(scene.record) else []
         pictures = "".join(
             figure(partial(result.plot, kind=kind), kind or "sweep") for kind in (*plain, *scene.observe)
         )
-        count = "" if thinned.cells == scene.cells else f"<p>{thinned.cells} of the scene's {scene.cells} cells.</p>"
+        count = "" if coarse.cells == scene.cells else f"<p>{coarse.cells} of the scene's {scene.cells} cells.</p>"
         sweep = f"{count}{rows_table(result.summary[1:3])}{pictures}"
         parts += [_section("Sweep", sweep)]
     rows = [
@@ -132,11 +130,3 @@ def _fixed(scene: Scene) -> str:
     moved = [axis.name for axis in scene.axes if axis.name != scene.strength]
     text = f"The sweep moves {', '.join(moved)}; this function is that of the scene's own values."
     return f'<p class="quiet">{escape(text)}</p>' if moved else ""
-
-
-def _thinned(axis: Axis, most: int | None) -> Axis:
-    """Thin an axis to at most `most` values, including both ends."""
-    if most is None or len(axis) <= most:
-        return axis
-    indices = np.unique(np.linspace(0, len(axis) - 1, most).round().astype(int))
-    return Axis(axis.name, tuple(axis.values[k] for k in indices))
