@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import lru_cache
-
 import numpy as np
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
-from .initial_row_modes import row_modes
+from .initial_row_modes import evaluate, row_modes
 
 CLOCK = 8.0  # period of the clock of an oscillator without a drive: a power of two, so that no digit is lost
 
@@ -36,7 +33,7 @@ def with_modes(equations: Equations, start: np.ndarray, parameters: np.ndarray) 
         of_nodes[sp.Symbol(name, real=True)] = np.concatenate(columns, axis=1)
     node_values = values | of_nodes | {s: states[:, k * n : (k + 1) * n] for k, s in enumerate(equations.node.state)}
     # Slip has the sign of the sliding velocity; at rest it is 0 unless the load exceeds a limit of static friction.
-    sliding, up, down = (_at(e, node_values, (len(states), n)) for e in (event.level, *event.limits))
+    sliding, up, down = (evaluate(e, node_values, (len(states), n)) for e in (event.level, *event.limits))
     push = _link_forces(equations, event.target, states, values, of_nodes)
     stuck = np.where(up + push < 0.0, 1.0, np.where(down + push > 0.0, -1.0, 0.0))
     states[:, 2 * n :] = np.where(sliding == 0.0, stuck, np.sign(sliding))
@@ -67,7 +64,7 @@ def _link_forces(
     for symbols, nodes in ((edge.here, target), (edge.there, source)):
         at_links |= {s: states[:, k * n + nodes] for k, s in enumerate(symbols)}
     force = edge.rhs[1].xreplace({edge.here[2]: sp.S.One, edge.here[1]: speed})
-    np.add.at(total.T, target, _at(force, at_links, (len(states), len(target))).T)
+    np.add.at(total.T, target, evaluate(force, at_links, (len(states), len(target))).T)
     return total
 
 
@@ -79,15 +76,3 @@ def local_clock(equations: Equations, period: np.ndarray) -> np.ndarray:
     if not equations.sticks or any(e.has(TIME) for template in equations.templates for e in template.expressions):
         return period
     return np.full(len(period), CLOCK)
-
-
-def _at(e: sp.Expr, values: dict[sp.Symbol, np.ndarray], shape: tuple[int, int]) -> np.ndarray:
-    value = _function(e, tuple(values))(*values.values())
-    return np.array(np.broadcast_to(value, shape), dtype=float)
-
-
-@lru_cache(maxsize=64)
-def _function(e: sp.Expr, symbols: tuple[sp.Symbol, ...]) -> Callable[..., np.ndarray]:
-    """Return an expression as a function, which the blocks of a sweep share."""
-    function: Callable[..., np.ndarray] = sp.lambdify(list(symbols), e, "numpy")
-    return function

@@ -35,7 +35,7 @@ def row_modes(equations: Equations, start: np.ndarray, parameters: np.ndarray, s
         states[:, slots[:, size:]] = 1.0
         inside = values | _of_nodes(equations, node, members, values, states)
         for a, row in enumerate(node.rows):
-            level, speed = (_at(e, inside, (len(states), len(members))) for e in (row.level, row.speed))
+            level, speed = (evaluate(e, inside, (len(states), len(members))) for e in (row.level, row.speed))
             if row.law is not Law.RESET:
                 level, speed = (np.where(abs(e) <= slack, 0.0, e) for e in (level, speed))
             _check_start(row, level, speed, members, node.continuous)
@@ -107,8 +107,8 @@ def _decide_together(
     for cell, numbers in undecided.items():
         at: Values = {s: column[cell] for s, column in values.items()}
         at |= {s: states[cell, k : k + 1] for s, k in places.items()}
-        rate, ratio = ([_at(getattr(rows[a], name), at, (1,))[0] for a in held] for name in ("rate", "ratio"))
-        stiffness = np.array([[_at(e, at, (1,))[0] for e in rows[a].stiffness] for a in held])
+        rate, ratio = ([evaluate(getattr(rows[a], name), at, (1,))[0] for a in held] for name in ("rate", "ratio"))
+        stiffness = np.array([[evaluate(e, at, (1,))[0] for e in rows[a].stiffness] for a in held])
         free = [held.index(a) for a in numbers]
         stops = np.array([rows[a].law is Law.STOP for a in held])
         best = _agreeing(np.array(rate), np.array(ratio), stiffness, stops, states[cell, slots], free)
@@ -134,7 +134,7 @@ def _modes_of_parts(equations: Equations, states: np.ndarray, values: Values, sl
         rows, undecided = part.rows, dict[int, list[int]]()
         for a, row in enumerate(rows):
             at = columns | {s: states[:, k] for k, s in enumerate(symbols)}
-            level, speed = (_at(e, at, (len(states),)) for e in (row.level, row.speed))
+            level, speed = (evaluate(e, at, (len(states),)) for e in (row.level, row.speed))
             if row.law is not Law.RESET:
                 level, speed = (np.where(abs(e) <= slack, 0.0, e) for e in (level, speed))
             _check_start(row, level[:, None], speed[:, None], [part.owners[a][0]], symbols)
@@ -189,12 +189,13 @@ def _of_nodes(equations: Equations, node: Node, members: Sequence[int], values: 
     return found
 
 
-def _at(e: sp.Expr, values: Values, shape: tuple[int, ...]) -> np.ndarray:
+def evaluate(e: sp.Expr, values: Values, shape: tuple[int, ...]) -> np.ndarray:
+    """Return the values of an expression in an array of some shape."""
     used = tuple(sorted(e.free_symbols, key=str))
     return np.array(np.broadcast_to(_function(e, used)(*(values[s] for s in used)), shape), dtype=float)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=256)  # the blocks of a sweep share the functions
 def _function(e: sp.Expr, symbols: tuple[sp.Symbol, ...]) -> Callable[..., np.ndarray]:
     function: Callable[..., np.ndarray] = sp.lambdify(list(symbols), e, "numpy")
     return function
