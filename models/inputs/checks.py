@@ -92,9 +92,7 @@ def check_keys(what: str, table: Mapping[object, object], names: Iterable[str]) 
 
 def check_table(what: str, value: object) -> Mapping[object, object]:
     """Return the value if it is a mapping; TypeError for any other."""
-    if not isinstance(value, Mapping):
-        raise TypeError(f"{what}: found {typed_repr(value)}; expected a table of names and values")
-    return value
+    return check_instance(what, value, Mapping, "a table of names and values")
 
 
 def check_text(what: str, value: object, limit: int = 200) -> str:
