@@ -73,6 +73,7 @@ class Point:
     critical: GrowthNumbers | None = None
     length: float = 0.0  # arclength from the first solution
     crossing: np.ndarray | None = None  # tangent of the branch that is left here
+    slopes: np.ndarray | None = None  # change of each growth by the length, on the step before
 
     @property
     def value(self) -> float:
@@ -196,7 +197,7 @@ def walk(problem: BranchProblem, first: Point, limits: Limits, events: Events) -
         for _, each in sorted([*located, *extra], key=lambda pair: pair[0]):
             yield each
         z, tangent = problem.accept(after.z, after.tangent)
-        before = Point(z, tangent, after.corrections, after.critical, after.length)
+        before = Point(z, tangent, after.corrections, after.critical, after.length, slopes=_slopes(before, after))
         yield before
         if end:
             yield end
@@ -243,6 +244,14 @@ def _advance(
                     return after, located, length, end
         step *= 0.5
     return None
+
+
+def _slopes(before: Point, after: Point) -> np.ndarray | None:
+    """Return the change of each growth by the length; None without growths."""
+    one, other = before.critical, after.critical
+    if one is None or other is None or len(one.growth) != len(other.growth):
+        return None
+    return np.asarray((other.growth - one.growth) / (after.length - before.length))
 
 
 def _fits(weights: np.ndarray, before: Point, after: Point, step: float) -> bool:

@@ -41,6 +41,9 @@ BESIDE, CLEAR = (1e-3, 5e-3, 0.025), 1e-7
 """Distance from a turn, relative to the step, at which the value that passes or touches zero is compared: the
 first at which it differs from zero by CLEAR, relative to the largest value (choices)."""
 
+SHORT = 1e-3
+"""Longest step on which a growth may seem to pass zero without doing so (a choice)."""
+
 MOST_HALVINGS = 1000
 """Most evaluations for a zero: a multiple one takes some hundred (a choice)."""
 
@@ -158,11 +161,24 @@ def bifurcations(
     turned = before.tangent[-1] * after.tangent[-1] < 0.0
     counts = sorted((critical_of(before).growing, critical_of(after).growing))
     if counts[0] == counts[1] and not turned:
-        return []
+        return None if _jumped(before, after, length) else []
     try:
         return _found(step, range(*counts), turned)
     except ArithmeticError:
         return None
+
+
+def _jumped(before: Point, after: Point, length: float) -> bool:
+    """Return whether a step may have passed a branch point onto the other branch.
+
+    A branch that is born in a pitchfork touches zero growth there.  Beyond lies the branch that it was born from, with
+    as many growing values.
+    """
+    if before.slopes is None or length < SHORT or len(before.slopes) != len(critical_of(after).growth):
+        return False
+    growth = critical_of(before).growth
+    nearest = int(abs(growth).argmin())
+    return bool(growth[nearest] * (growth[nearest] + length * before.slopes[nearest]) < 0.0)
 
 
 def _found(step: BranchStep, indices: range, turned: bool) -> list[tuple[float, object]] | None:
@@ -184,9 +200,7 @@ def _found(step: BranchStep, indices: range, turned: bool) -> list[tuple[float, 
                 if min(map(abs, sides)) > CLEAR * scale:
                     break
             kind = problem.kind(complex(critical.values[touching].real), sides[0] * sides[1] < 0.0)
-            point = step.at(turn)
-            if kind is not BifurcationKind.FOLD:  # a flat turn has no digits in either form: take the better one
-                point = min((point, step.branch_point(turn, None)), key=lambda each: abs(_nearest(each)))
+            point = step.at(turn) if kind is BifurcationKind.FOLD else step.branch_point(turn, None)
             located.append((turn, Located(kind, point, touching, scale)))
     for k, (distance, each) in enumerate(located):
         if each.kind is BifurcationKind.BRANCH_POINT:

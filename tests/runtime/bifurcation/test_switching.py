@@ -111,6 +111,18 @@ def test_cycles_that_begin_on_the_other_side_of_a_hopf_point_are_refused() -> No
     assert again.values.max() > end.value
 
 
+def test_cycles_of_two_turns_end_where_their_period_doubles() -> None:
+    """Beyond c = 2.832445027862 a long step meets the cycle of one turn, which is as stable."""
+    rossler = sc.Field({"x": "-y - z", "y": "x + y/5", "z": "1/5 + z*(x - c)"}, parameters={"c": 3.2})
+    first = sc.periodic_orbit(sc.Scene(rossler), start=[6.1149, -3.0838, 0.6005], period=11.531)
+    assert first.period == pytest.approx(11.53108104121, rel=1e-11)
+    branch = sc.follow(first, "c", to=2.5)
+    (end,) = branch.bifurcations
+    assert (end.kind, end.value) == ("period doubling", pytest.approx(2.832445027862, abs=1e-11))
+    assert branch.ends == ("period doubling at c = 2.832445",)
+    assert end.orbit.period == pytest.approx(5.76982001651, rel=1e-10)
+
+
 def test_cycles_end_at_their_hopf_point_to_rounding() -> None:
     """The unstable cycles of Lorenz end at r = 470/19, those of a Brusselator at B = 5."""
     lorenz = sc.Field({"x": "10*(y - x)", "y": "r*x - y - x*z", "z": "x*y - 8/3*z"}, parameters={"r": 24})
