@@ -67,6 +67,12 @@ class Corner:
 class Corners:
     """Find bifurcations on the steps of a branch of orbits with stick and slip."""
 
+    @classmethod
+    def of(cls, problem: Cycles) -> Corners | None:
+        """Return the search for corners of one oscillator with stick and slip; None of others."""
+        equations = problem.flow.equations
+        return cls(problem) if equations.sticks and equations.n == 1 else None
+
     def __init__(self, problem: Cycles) -> None:
         self.lone, self.problem = problem.scene.lone, problem
         self.known: dict[bytes, Phases] = {}
@@ -142,10 +148,10 @@ class Corners:
             near, far = (at, far) if self.phases(step.at(at)).slip_states == one.slip_states else (near, at)
         return near
 
-    def at_end(self, points: list[Point]) -> Corner | None:
+    def at_end(self, last: Point) -> Corner | None:
         """Return the graze at which a branch ends; None if the gap of its last orbit is open."""
-        gap = self.phases(points[-1]).gap
-        return Corner(BifurcationKind.GRAZING, points[-1], abs(gap)) if abs(gap) < CLOSING else None
+        gap = self.phases(last).gap
+        return Corner(BifurcationKind.GRAZING, last, abs(gap)) if abs(gap) < CLOSING else None
 
     def between_events(self, point: Point) -> float | None:
         """Return a time far from events if one meets the beginning of the cycle, where the state jumps; None else."""

@@ -513,6 +513,15 @@ class Cycles:
         vectors = self.at_drive(z)[1][0] @ (self.scale[:, None] * (bases[0] @ small))
         return np.linalg.qr(expansion(self.scene.equations, self.classes, len(self.scale)) @ vectors)[0]
 
+    def network_states(self, z: np.ndarray) -> np.ndarray:
+        """Return the states of the network at the beginning of a point, tangent or row of states of the quotient."""
+        size = len(self.scale)
+        return np.asarray(expansion(self.scene.equations, self.classes, size) @ z[:size])
+
+    def mode(self, block: int) -> str:
+        """Describe a mode of the graph; empty if a multiplier belongs to none."""
+        return "" if self.transversal is None or block < 0 else self.transversal.text(block)
+
     def birth(self, z: np.ndarray) -> BifurcationKind | None:
         """Return the bifurcation in which the cycles are born, if a branch point is one; None else."""
         away = np.abs(self.flow.rates(self.values(z), self.states(z)) / self.scale).max() * self.period(z)

@@ -11,11 +11,11 @@ Source: Farrell, Birkisson & Funke, SIAM J. Sci. Comput. 37, A2026 (2015), equat
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from synchain.models.dynamics.angles import periods_of_kinds
+from synchain.models.dynamics.angles import periods_of_states
 from synchain.models.inputs.checks import check_integer, check_keys, check_seed, check_table, short_repr
 from synchain.models.scenes.scene import Scene
 
@@ -51,12 +51,7 @@ class Known:
         self.shifts, self.scales = shifts, scales  # (states, shifts), (states,)
         self.states = np.zeros((0, equations.dimension))
         # The period of each state, infinite if it is no angle.
-        self.periods = np.full(equations.dimension, np.inf)
-        kinds = periods_of_kinds(equations)
-        for places, kind in zip(equations.places, equations.kind_of, strict=True):
-            for place, period in zip(places, kinds[kind], strict=True):
-                if period is not None:
-                    self.periods[place] = period
+        self.periods = np.array([period or np.inf for period in periods_of_states(equations)])
 
     def add(self, state: np.ndarray) -> None:
         """Add an equilibrium and its images."""
@@ -206,19 +201,26 @@ def _starts(scene: Scene, seed: int, ranges: Mapping[str, tuple[float, float]] |
     spread = np.resize(SCALES, STARTS)[:, None] * scales
     spread[:, angles] = np.pi
     low, high = first - spread, first + spread
-    ranges = {} if ranges is None else ranges
-    check_keys("equilibria: ranges", check_table("equilibria: ranges", ranges), list(states.components))
-    for name, interval in ranges.items():
-        pair = row(f"equilibria: the range of {name}", interval, 2)
-        if len(pair) != 2 or not pair[0] < pair[1]:
-            raise ValueError(
-                f"equilibria: the range of {name} is {short_repr(interval)}; expected two numbers, the lower one first"
-            )
-        chosen = states.rows == states.components.index(name)
+    for component, pair in checked_ranges("equilibria", {} if ranges is None else ranges, states.components):
+        chosen = states.rows == component
         low[:, chosen], high[:, chosen] = pair
         scales[chosen] = 0.5 * (pair[1] - pair[0])
     share = np.random.default_rng(seed).uniform(size=(STARTS, size))
     return low + (high - low) * share, scales
+
+
+def checked_ranges(
+    function: str, ranges: Mapping[str, tuple[float, float]], components: Sequence[str]
+) -> Iterator[tuple[int, np.ndarray]]:
+    """Yield the number of each component with a range of initial values, and its ends."""
+    check_keys(f"{function}: ranges", check_table(f"{function}: ranges", ranges), list(components))
+    for name, interval in ranges.items():
+        ends = row(f"{function}: the range of {name}", interval, 2)
+        if len(ends) != 2 or not ends[0] < ends[1]:
+            raise ValueError(
+                f"{function}: the range of {name} is {short_repr(interval)}; expected two numbers, the lower one first"
+            )
+        yield components.index(name), ends
 
 
 def _deflated(network: Linearised, start: np.ndarray, known: Known, shifts: np.ndarray) -> np.ndarray | None:

@@ -20,7 +20,7 @@ from synchain.models.scenes.scene import Scene
 from ..cells.run_keywords import with_numbers
 from .arclength import Point
 from .eigenvalues import SMALL, ModeBlocks, eigenvalues
-from .equilibrium import Equilibrium, resting_equations
+from .equilibrium import Equilibrium, bordered, resting_equations
 from .kinds import BifurcationKind
 from .linearised import Linearised
 from .problems import GrowthNumbers, Matrix
@@ -62,16 +62,12 @@ class Equilibria:
         self.values: Mapping[str, float] = dict(scene.parameters)
         self.network = Linearised.of(equations, self.values)
         self.by_parameters = [Linearised.of(derivative(equations, name), self.values) for name in names]
-        # Shifts: columns of ones, and the first node of each is pinned.
+        # Shifts: columns of ones, of which the first node is pinned.
         places = np.cumsum([0, *(len(equations.holders(name)) for name in equations.components)])
-        self.first_of = places[:-1]
-        rows = [np.arange(*places[k : k + 2]) for k in map(equations.components.index, shifts)]
-        lengths = [len(each) for each in rows]
-        indices = (np.concatenate([*rows, []]).astype(int), np.repeat(np.arange(len(rows)), lengths))
-        self.ones = sparse.csc_array((np.ones(sum(lengths)), indices), (self.size, len(rows)))
-        self.pinned = np.array([each[0] for each in rows], dtype=int)
-        pins = (np.ones(len(rows)), (np.arange(len(rows)), self.pinned))
-        self.pins = sparse.csc_array(pins, (len(rows), self.size))
+        self.first_of, self.ones = places[:-1], np.zeros((self.size, len(shifts)))
+        for column, name in zip(self.ones.T, shifts, strict=True):
+            column[slice(*places[equations.components.index(name) :][:2])] = 1.0
+        self.pinned = self.ones.argmax(axis=0)
         self.leaders = np.arange(self.size)  # (states,): the state that each is kept equal to
         self.blocks = ModeBlocks.of(equations)
         self.point = np.concatenate([state, speeds, [self.values[name] for name in names]])
@@ -160,12 +156,6 @@ class Equilibria:
             self.last = key, self.network.at(values), [each.at(values) for each in self.by_parameters]
         return state, speeds, *self.last[1:]
 
-    def bordered(self, jacobian: sparse.csc_array) -> sparse.csc_array:
-        """Return the derivative of the equations by state and speeds."""
-        if not self.shifts:
-            return jacobian
-        return sparse.csc_array(sparse.block_array([[jacobian, -self.ones], [self.pins, None]], format="csc"))
-
     def linearise(self, z: np.ndarray) -> tuple[np.ndarray, Matrix]:
         """Return the remaining rates and pins, and their derivatives."""
         state, speeds, network, by_parameters = self._at(z)
@@ -177,7 +167,9 @@ class Equilibria:
             entries = matrix
         else:
             residual = np.append(rates - self.ones @ speeds, state[self.pinned] - self.point[self.pinned])
-            whole = sparse.hstack([self.bordered(network.jacobian(state)), sparse.csc_array(columns)], format="csc")
+            whole = sparse.hstack(
+                [bordered(network.jacobian(state), self.ones), sparse.csc_array(columns)], format="csc"
+            )
             entries, matrix = whole.data, whole.toarray() if self.size <= SMALL else sparse.csc_array(whole)
         if not (np.isfinite(residual).all() and np.isfinite(entries).all()):
             raise ArithmeticError("a rate or its slope has no value")
@@ -236,13 +228,21 @@ class Equilibria:
         residual = float(np.abs(self.linearise(point.z)[0]).max())
         return Equilibrium(scene, state, numbers, self.shifts, speeds, residual, point.corrections)
 
-    def vectors(self, z: np.ndarray, value: complex, count: int) -> np.ndarray:
+    def network_states(self, z: np.ndarray) -> np.ndarray:
+        """Return the states of the network in a point or tangent."""
+        return z[: self.size]
+
+    def mode(self, block: int) -> str:
+        """Describe a mode of the graph; empty if an eigenvalue belongs to none."""
+        return "" if self.blocks is None or block < 0 else self.blocks.text(block)
+
+    def vectors(self, z: np.ndarray, value: complex, count: int, block: int = -1) -> np.ndarray:
         """Return eigenvectors (states, count) of M^-1 J for an eigenvalue of some multiplicity, orthonormal."""
         state, _, network, _ = self._at(z)
         jacobian, mass = network.jacobian(state), network.mass(state)
         mass = sparse.eye_array(self.size, format="csc") if mass is None else mass
         # At zero the shifts are null vectors too: border the matrix, so that they are left out.
-        shifted = jacobian if value else self.bordered(jacobian)
+        shifted = jacobian if value else bordered(jacobian, self.ones)
         size, scale = shifted.shape[0], float(abs(jacobian).max()) or 1.0
         heavy = sparse.block_diag([mass, sparse.csc_array((size - self.size,) * 2)], format="csc")
         # Inverse iteration beside the eigenvalue.

@@ -303,7 +303,19 @@ def near(
 ) -> Equilibrium:
     """Find the equilibrium near a state with `count` eigenvalues; `shifted`: what `shifted_components` returns."""
     names, shifts = shifted
-    state, speeds, residual, search = _solve(network, first, shifts)
+    search = Search.begin(network, first, shifts)
+    if not search.newton():
+        failed, search = search, Search.begin(network, first, shifts)
+        search.relax()
+        if not search.newton():
+            by_newton, by_motion = (np.abs(each.left(each.state, each.speeds)).max() for each in (failed, search))
+            raise ArithmeticError(
+                f"no equilibrium near the start: Newton's method left rates of {by_newton:.2g}, and steps "
+                f"along the motion {by_motion:.2g}; start elsewhere, or there is none"
+            )
+    state, terms = search.state, network.term_sizes(search.state) + np.abs(shifts @ search.speeds)
+    speeds = np.where(np.abs(search.speeds) > EVEN * terms.max(), search.speeds, 0.0)
+    residual = float(np.abs(search.left(state, search.speeds)).max())
     jacobian, blocks = network.jacobian(state), None if count else ModeBlocks.of(scene.equations)
     by_modes = None if blocks is None else blocks.values(jacobian)
     values = eigenvalues(jacobian, network.mass(state), count) if by_modes is None else by_modes[0]
@@ -390,6 +402,15 @@ def shifted_components(
     return tuple(names), np.array(vectors).reshape(-1, len(state)).T
 
 
+def bordered(matrix: sparse.csc_array, shifts: np.ndarray) -> sparse.csc_array:
+    """Return [[J, -e], [p, 0]] for shifts e (states, k); p pins the first node, as a full row e' would fill the factors."""
+    count = shifts.shape[1]
+    if not count:
+        return matrix
+    pins = sparse.csc_array((np.ones(count), (np.arange(count), shifts.argmax(axis=0))), (count, len(shifts)))
+    return sparse.csc_array(sparse.block_array([[matrix, -sparse.csc_array(shifts)], [pins, None]], format="csc"))
+
+
 @dataclass(slots=True)
 class Search:
     """A state during the search; the remaining rates are r(x) - shifts @ speeds."""
@@ -435,12 +456,7 @@ class Search:
         if rate:
             mass = self.network.mass(self.state)
             matrix = matrix - rate * (sparse.eye_array(len(gap), format="csc") if mass is None else mass)
-        if count:  # pin the first node of each shift: a full row e' would fill the factors
-            border = sparse.csc_array(self.shifts)
-            pinned = self.shifts.argmax(axis=0)
-            pins = sparse.csc_array((np.ones(count), (np.arange(count), pinned)), (count, len(gap)))
-            matrix = sparse.block_array([[matrix, -border], [pins, None]], format="csc")
-        change = _solve_linear(matrix, np.append(-gap, np.zeros(count)))
+        change = _solve_linear(bordered(matrix, self.shifts), np.append(-gap, np.zeros(count)))
         step, speeds = change[: len(gap)], change[len(gap) :]
         # Of all steps that differ by shifts, take the one normal to them; their vectors have no states in common. J is
         # zero along a shift, but the implicit Euler step has -rate there, which the speeds take over.
@@ -509,24 +525,6 @@ class Search:
                 continue
             self.state, self.speeds, gap, self.steps = state, speeds, left, self.steps + 1
             rate *= ratio  # switched evolution relaxation: h grows as 1/|r| (Kelley & Keyes)
-
-
-def _solve(network: Linearised, first: np.ndarray, shifts: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, Search]:
-    """Return the state at equilibrium near a first one, its speeds along the shifts, the residual and the search."""
-    search = Search.begin(network, first, shifts)
-    if not search.newton():
-        failed, search = search, Search.begin(network, first, shifts)
-        search.relax()
-        if not search.newton():
-            by_newton, by_motion = (np.abs(each.left(each.state, each.speeds)).max() for each in (failed, search))
-            raise ArithmeticError(
-                f"no equilibrium near the start: Newton's method left rates of {by_newton:.2g}, and steps "
-                f"along the motion {by_motion:.2g}; start elsewhere, or there is none"
-            )
-    terms = network.term_sizes(search.state) + np.abs(shifts @ search.speeds)
-    speeds = np.where(np.abs(search.speeds) > EVEN * terms.max(), search.speeds, 0.0)
-    residual = float(np.abs(search.left(search.state, search.speeds)).max())
-    return search.state, speeds, residual, search
 
 
 def _solve_linear(matrix: sparse.csc_array, right: np.ndarray) -> np.ndarray:

@@ -17,11 +17,10 @@ import numpy as np
 import sympy as sp
 from scipy import sparse
 
-from synchain.models.dynamics.equations import Equations, Layer
-from synchain.models.graphs.links import Link
+from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.names import NodeName
 from synchain.models.mechanics.calculus import NOTHING, derivative
-from synchain.models.mechanics.components import Block, Edge
+from synchain.models.mechanics.components import Block
 
 Values = Callable[..., list[float | np.ndarray]]
 """Expressions as a function of states and parameters, each a number or an array (count,)."""
@@ -185,7 +184,7 @@ class Linearised:
         return sparse.csc_array(sparse.coo_array((entries, (rows, columns)), shape=(self.dimension, self.dimension)))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=32)
 def _compiled(equations: Equations) -> Linearised:
     """Compile equations; their parameters have no values before `at`."""
     templates = (*_node_templates(equations), *_link_templates(equations))
@@ -195,7 +194,7 @@ def _compiled(equations: Equations) -> Linearised:
     return Linearised(equations, equations.dimension, tuple(rates), tuple(masses), templates, equations.constant_mass)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=32)
 def _along(equations: Equations, order: int) -> Linearised:
     """Compile the derivative of an order of the rates along a direction."""
     network = _compiled(equations)
@@ -253,24 +252,18 @@ def _link_templates(equations: Equations) -> Iterator[TermTemplate]:
     for layer in equations.layers:
         for ends, edge in layer.edge_of:
             links = [link for link in layer.links if equations.ends(link) == ends]
-            if links:
-                yield _link_template(equations, layer, edge, links)
-
-
-def _link_template(equations: Equations, layer: Layer, edge: Edge, links: list[Link]) -> TermTemplate:
-    """Return the template of some links of a layer."""
-    targets, sources = [i for i, _, _ in links], [j for _, j, _ in links]
-    places = equations.places
-    states = tuple(np.array([places[i] for i in nodes]) for nodes in (targets, sources))
-    # Parameters: the weight; those of the link, where the layer varies them, else of the target; those of the source.
-    parameters: list[Parameter] = [np.array([float(weight) for _, _, weight in links])]
-    for s in edge.parameters:
-        varies = s.name in layer.varied
-        names = tuple(layer.name(s.name, link) for link in links) if varies else _at_nodes(equations, s.name, targets)
-        parameters.append(names)
-    parameters += [_at_nodes(equations, of.name, sources) for _, of in edge.theirs]
-    others = [edge.weight, *edge.parameters, *(s for s, _ in edge.theirs)]
-    return TermTemplate([*edge.here, *edge.there], others, edge.rhs, list(edge.inertia), states, parameters)
+            if not links:
+                continue
+            targets, sources = [i for i, _, _ in links], [j for _, j, _ in links]
+            states = tuple(np.array([equations.places[i] for i in nodes]) for nodes in (targets, sources))
+            # The weight; parameters of the link, where the layer varies them, else of the target; those of the source.
+            parameters: list[Parameter] = [np.array([float(weight) for _, _, weight in links])]
+            for s in edge.parameters:
+                by_link = tuple(layer.name(s.name, link) for link in links) if s.name in layer.varied else None
+                parameters.append(by_link or _at_nodes(equations, s.name, targets))
+            parameters += [_at_nodes(equations, of.name, sources) for _, of in edge.theirs]
+            others = [edge.weight, *edge.parameters, *(s for s, _ in edge.theirs)]
+            yield TermTemplate([*edge.here, *edge.there], others, edge.rhs, list(edge.inertia), states, parameters)
 
 
 def _at_nodes(equations: Equations, name: str, nodes: list[int]) -> Parameter:

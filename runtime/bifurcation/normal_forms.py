@@ -15,6 +15,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from .equilibria import Equilibria
+from .equilibrium import bordered
 
 
 def first_lyapunov_coefficient(problem: Equilibria, z: np.ndarray, vector: np.ndarray, frequency: float) -> float:
@@ -54,8 +55,8 @@ def first_lyapunov_coefficient(problem: Equilibria, z: np.ndarray, vector: np.nd
     plus, minus, aaa, bbb = cubic(a + b), cubic(a - b), cubic(a), cubic(b)
     thrice = aaa + (plus + minus - 2.0 * aaa) / 6.0 + 1j * ((plus - minus - 2.0 * bbb) / 6.0 + bbb)
     around = bilinear(q, q.conj()).real
-    bordered = problem.bordered(jacobian)
-    mean = splu(sparse.csc_array(bordered)).solve(np.append(around, np.zeros(bordered.shape[0] - len(state))))
+    right = np.append(around, np.zeros(len(problem.shifts)))
+    mean = splu(sparse.csc_array(bordered(jacobian, problem.ones))).solve(right)
     double = splu(sparse.csc_array(2j * frequency * mass - jacobian)).solve(bilinear(q, q))
     terms = thrice - 2.0 * bilinear(q, mean[: len(state)].astype(complex)) + bilinear(q.conj(), double)
     return float((y.conj() @ terms).real / (2.0 * frequency))

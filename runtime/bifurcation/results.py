@@ -27,28 +27,10 @@ if TYPE_CHECKING:
 
 Solution = Equilibrium | PeriodicOrbit
 
-NAMES = frozenset(
-    [
-        "arclength",
-        "bifurcation",
-        "bifurcation_kind",
-        "branch",
-        "component",
-        "eigenvalues",
-        "growing",
-        "multipliers",
-        "node",
-        "number",
-        "orbit",
-        "period",
-        "periods",
-        "point",
-        "stable",
-        "state",
-        "turn",
-        "vectors",
-    ]
-)
+NAMES = frozenset([
+    "arclength", "bifurcation", "bifurcation_kind", "branch", "component", "eigenvalues", "growing", "multipliers",
+    "node", "number", "orbit", "period", "periods", "point", "stable", "state", "turn", "vectors",
+])  # fmt: skip
 """Names in the data of branches and diagrams, which no parameter may have, beside those of all results."""
 
 

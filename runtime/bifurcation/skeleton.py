@@ -21,7 +21,7 @@ import numpy as np
 
 from synchain.models.dynamics.angles import periods_of_states
 from synchain.models.dynamics.reduction import without_drive
-from synchain.models.inputs.checks import check_keys, check_number, check_seed, check_table, short_repr
+from synchain.models.inputs.checks import check_number, check_seed, short_repr
 from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.scenes.defaults import TimeUnit
 from synchain.models.scenes.scene import Scene, check_scene
@@ -29,11 +29,10 @@ from synchain.models.scenes.scene import Scene, check_scene
 from ..cells.run_keywords import Given, chosen, with_numbers
 from ..stability.motion import whole_turns
 from ..stability.orbits import OrbitProblem, driven_states, within
-from ..support.arrays import row
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .branches import checked_values, follow
-from .deflation import equilibria
+from .deflation import checked_ranges, equilibria
 from .equilibrium import Equilibrium
 from .flow import TOLERANCE
 from .periodic import NEWTON, check_periods, periodic_orbit
@@ -222,15 +221,9 @@ def _box(scene: Scene, ranges: Mapping[str, Range]) -> np.ndarray:
     A component without a range has the scene's initial value twice.
     """
     names = [name for name in scene.components if name not in scene.equations.modes]
-    check_keys("skeleton: ranges", check_table("skeleton: ranges", ranges), names)
     ends = np.array([[scene.initial[name][0]] * 2 for name in names], dtype=float).T
-    for name, interval in ranges.items():
-        pair = row(f"skeleton: the range of {name}", interval, 2)
-        if len(pair) != 2 or not pair[0] < pair[1]:
-            raise ValueError(
-                f"skeleton: the range of {name} is {short_repr(interval)}; expected two numbers, the lower one first"
-            )
-        ends[:, names.index(name)] = pair
+    for component, pair in checked_ranges("skeleton", ranges, names):
+        ends[:, component] = pair
     return ends
 
 
