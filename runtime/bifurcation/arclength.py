@@ -27,40 +27,24 @@ from scipy.sparse.linalg import splu
 
 from .problems import BranchProblem, GrowthNumbers, Matrix
 
-MOST_CORRECTIONS = 12
-"""Most corrections of a step (a choice)."""
-
-STALLED = 100.0
-"""Largest residual of a solution in units of rounding, where Newton's method has stalled (a choice)."""
-
-CLOSE = 1e-11
-"""A solution is accepted after a correction of this length; the next would be its square (a choice)."""
-
+MOST_CORRECTIONS = 12  # most corrections of a step (a choice)
+STALLED = 100.0  # largest residual of a solution in units of rounding, where Newton's method has stalled (a choice)
+CLOSE = 1e-11  # a solution is accepted after a correction of this length; the next would be its square (a choice)
+# Steps of at most FEW corrections are LONGER next time, those of more than MANY are SHORTER (choices).
 FEW, MANY, LONGER, SHORTER = 3, 5, 1.4, 0.7
-"""Steps of at most FEW corrections are LONGER next time, those of more than MANY are SHORTER (choices)."""
-
+# Cosine of the largest angle between the tangents at both ends of a step (a choice).
 ANGLE = math.cos(math.radians(25.0))
-"""Cosine of the largest angle between the tangents at both ends of a step (a choice)."""
-
+# Largest correction, relative to the step, of a step that does not turn; a larger one leads to another branch (a
+# choice).
 ASIDE = 0.03
-"""Largest correction, relative to the step, of a step that does not turn; a larger one leads to another branch (a choice)."""
-
-KINK = 1.0 / 64.0
-"""Longest step across a kink of the branch (a choice)."""
-
+KINK = 1.0 / 64.0  # longest step across a kink of the branch (a choice)
+# Least length of a step that ends on a bound, relative to that of its guess: a shorter one leads to another branch (a
+# choice).
 AHEAD = 0.1
-"""Least length of a step that ends on a bound, relative to that of its guess: a shorter one leads to another branch (a
-choice)."""
-
-SHORTEST = 1e-9
-"""Shortest step; the branch is lost if it must be shorter (a choice)."""
-
-
+SHORTEST = 1e-9  # shortest step; the branch is lost if it must be shorter (a choice)
+# First and largest step, in parts of the range of the parameter and of the size of the states (choices).
 FIRST_STEP, LARGEST_STEP = 0.01, 0.05
-"""First and largest step, in parts of the range of the parameter and of the size of the states (choices)."""
-
-MOST = 1000
-"""Most solutions in each direction (a choice)."""
+MOST = 1000  # most solutions in each direction (a choice)
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,8 +200,11 @@ def _advance(
         length, end = step, ""
         weights = problem.weights
         if after is not None and (_fits(weights, before, after, step) or (problem.kinked and step < KINK)):
-            passed = _passed(after.z, limits.bounds)
-            if passed is not None:  # end on the bound
+            # An unknown that has left its bounds, if one has: the branch ends on the bound.
+            places = zip(range(-len(limits.bounds), 0), limits.bounds, strict=True)
+            inside = ((place, min(max(after.z[place], low), high)) for place, (low, high) in places)
+            passed = next(((place, bound) for place, bound in inside if bound != after.z[place]), None)
+            if passed is not None:
                 place, bound = passed
                 if (
                     bound == before.z[place] and before.critical is None
@@ -264,14 +251,6 @@ def _fits(weights: np.ndarray, before: Point, after: Point, step: float) -> bool
         if np.linalg.norm(moved - (moved @ other) * other) < aside * step:
             return False
     return cosine > ANGLE and aside < math.tan(math.acos(min(1.0, cosine))) + ASIDE
-
-
-def _passed(z: np.ndarray, bounds: Sequence[tuple[float, float]]) -> tuple[int, float] | None:
-    """Return the place and the bound of an unknown that has left its bounds."""
-    for place, (low, high) in zip(range(-len(bounds), 0), bounds, strict=True):
-        if not low <= z[place] <= high:
-            return place, low if z[place] < low else high
-    return None
 
 
 def _at_values(

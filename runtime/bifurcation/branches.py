@@ -37,20 +37,15 @@ Direction = Literal["both", "up", "down"]
 First = Equilibrium | PeriodicOrbit | Bifurcation
 """Where a branch begins."""
 
+# Signs of the first step of the parameter for each direction.
 SIGNS: Mapping[str, tuple[float, ...]] = {"both": (-1.0, 1.0), "up": (1.0,), "down": (-1.0,)}
-"""Signs of the first step of the parameter for each direction."""
 
 Part = tuple[list[tuple[Point, Equilibrium | PeriodicOrbit]], list[Bifurcation], str]
 """The points of a branch in one direction with their solutions, the bifurcations, and how it ends."""
 
-SAME_GRAZE = 1e-5
-"""Two grazes at the end of a branch that are nearer to each other are one (a choice)."""
-
-BORN = (BifurcationKind.HOPF, BifurcationKind.PERIOD_DOUBLING)
-"""Where cycles are born."""
-
-LEFT = (BifurcationKind.BRANCH_POINT, BifurcationKind.FOLD)
-"""Where a branch leaves to both sides."""
+SAME_GRAZE = 1e-5  # two grazes at the end of a branch that are nearer to each other are one (a choice)
+BORN = (BifurcationKind.HOPF, BifurcationKind.PERIOD_DOUBLING)  # where cycles are born
+LEFT = (BifurcationKind.BRANCH_POINT, BifurcationKind.FOLD)  # where a branch leaves to both sides
 
 
 class FollowOptions(TypedDict, total=False):

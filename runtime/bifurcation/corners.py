@@ -22,22 +22,15 @@ from .kinds import BifurcationKind
 from .phases import Phases, RowPhases, phases_of
 from .problems import BranchProblem
 
-APART = 1.0 / 64.0
-"""Longest step on which a change of phases is located; two changes on one count as one (a choice)."""
-
+APART = 1.0 / 64.0  # longest step on which a change of phases is located; two changes on one count as one (a choice)
+# A gap of SHUT is an error of the integration; each step towards a graze leaves SHARE of the gap (choices).
 SHUT, SHARE, MOST_STEPS = 1e-13, 1.0 / 16.0, 80
-"""A gap of SHUT is an error of the integration; each step towards a graze leaves SHARE of the gap (choices)."""
-
-CLOSING = 1e-6
-"""Largest gap of the last orbit of a branch that ends in a graze (a choice)."""
-
-
+CLOSING = 1e-6  # largest gap of the last orbit of a branch that ends in a graze (a choice)
+# Where an event is this near to the beginning of a cycle, in cycles, the cycle begins elsewhere (a choice).
 EARLY = 1e-4
-"""Where an event is this near to the beginning of a cycle, in cycles, the cycle begins elsewhere (a choice)."""
-
+# Largest distance that a multiplier moves in a step, relative to its modulus if that exceeds 1 (a choice): a step
+# that leads to another branch shows in the multipliers.
 MOVE = 0.75
-"""Largest distance that a multiplier moves in a step, relative to its modulus if that exceeds 1 (a choice): a step that
-leads to another branch shows in the multipliers."""
 
 
 def cycle_bifurcations(
@@ -110,7 +103,10 @@ class Corners:
 
     def _located(self, step: BranchStep, one: Phases, other: Phases) -> tuple[Corner, float, float]:
         """Return the change of phases, and the nearest distances on both sides of it."""
-        if _same_slips(one, other) and one.landing * other.landing < 0.0:
+        slips = [sorted(mode for mode in phases.slip_states if mode != 0) for phases in (one, other)]
+        sticks = [phases.slip_states.count(0) for phases in (one, other)]
+        # Only stick phases come or go, and the load at the landing passes the limit.
+        if slips[0] == slips[1] and sticks[0] != sticks[1] and one.landing * other.landing < 0.0:
             at = float(brentq(lambda h: self.phases(step.at(h)).landing, 0.0, step.length, xtol=1e-14 * step.length))
             point = step.at(at)
             return Corner(BifurcationKind.STICK_LOSS, point, abs(self.phases(point).landing)), at, at
@@ -164,9 +160,3 @@ class Corners:
         times = np.append(phases.times, phases.times[0] + 1.0)
         widest = int(np.diff(times).argmax())
         return float(times[widest : widest + 2].mean() % 1.0) * period
-
-
-def _same_slips(before: Phases, after: Phases) -> bool:
-    """Return whether only stick phases come or go."""
-    slips = [sorted(mode for mode in phases.slip_states if mode != 0) for phases in (before, after)]
-    return slips[0] == slips[1] and before.slip_states.count(0) != after.slip_states.count(0)

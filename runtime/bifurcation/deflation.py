@@ -26,20 +26,14 @@ from .equilibrium import REFUSED, Equilibrium, Search, near, resting_equations, 
 from .linearised import Linearised
 from .switching import permutations_of
 
-STARTS, ROUNDS = 40, 3
-"""Number of starts, and of searches from each after one that found a new equilibrium (choices)."""
-
+STARTS, ROUNDS = 40, 3  # number of starts, and of searches from each after one that found a new equilibrium (choices)
+# Most steps of a search, and the longest step in units of the region of the starts (choices).
 MOST_STEPS, LONGEST = 50, 4.0
-"""Most steps of a search, and the longest step in units of the region of the starts (choices)."""
-
+# Newton's method of `equilibrium` takes over where a step is shorter than this part of the region (a choice).
 NEAR = 1e-3
-"""Newton's method of `equilibrium` takes over where a step is shorter than this part of the region (a choice)."""
-
-SAME = 1e-6
-"""Largest distance of two equilibria that count as one, relative to the region (a choice)."""
-
+SAME = 1e-6  # largest distance of two equilibria that count as one, relative to the region (a choice)
+# Sizes of the region of the starts, relative to the largest initial state of each component (choices).
 SCALES = (1.0, 2.0, 4.0, 8.0)
-"""Sizes of the region of the starts, relative to the largest initial state of each component (choices)."""
 
 
 class Known:

@@ -30,29 +30,21 @@ from .arclength import ANGLE, Point, correct
 from .kinds import BifurcationKind
 from .problems import BranchProblem, GrowthNumbers
 
+# Bifurcations nearer than this part of a step are one of higher multiplicity, or lie on a turn (a choice).
 TOGETHER = 1e-8
-"""Bifurcations nearer than this part of a step are one of higher multiplicity, or lie on a turn (a choice)."""
-
+# Largest growth of the value that touches zero at a turn, relative to the largest value (a choice): it grows as the
+# square of the distance, which is located to half of the digits.
 TOUCHING = 1e-5
-"""Largest growth of the value that touches zero at a turn, relative to the largest value (a choice): it grows as the
-square of the distance, which is located to half of the digits."""
-
+# Distance from a turn, relative to the step, at which the value that passes or touches zero is compared: the first at
+# which it differs from zero by CLEAR, relative to the largest value (choices).
 BESIDE, CLEAR = (1e-3, 5e-3, 0.025), 1e-7
-"""Distance from a turn, relative to the step, at which the value that passes or touches zero is compared: the
-first at which it differs from zero by CLEAR, relative to the largest value (choices)."""
-
-SHORT = 1e-3
-"""Longest step on which a growth may seem to pass zero without doing so (a choice)."""
-
-MOST_HALVINGS = 1000
-"""Most evaluations for a zero: a multiple one takes some hundred (a choice)."""
-
+SHORT = 1e-3  # longest step on which a growth may seem to pass zero without doing so (a choice)
+MOST_HALVINGS = 1000  # most evaluations for a zero: a multiple one takes some hundred (a choice)
+# Solutions of a step from which a branch point is computed, and its largest distance from where it was looked for,
+# relative to half of the step (choices).
 NODES, NEAR = 9, 1e-3
-"""Solutions of a step from which a branch point is computed, and its largest distance from where it was looked for,
-relative to half of the step (choices)."""
-
+# A value whose imaginary part is smaller, relative to the largest value, is real: the square root of rounding.
 REAL = 1e-7
-"""A value whose imaginary part is smaller, relative to the largest value, is real: the square root of rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +197,15 @@ def _found(step: BranchStep, indices: range, turned: bool) -> list[tuple[float, 
     for k, (distance, each) in enumerate(located):
         if each.kind is BifurcationKind.BRANCH_POINT:
             located[k] = distance, replace(each, point=replace(each.point, tangent=step.tangent(distance)))
-    return [*_together(located, length)]
+    # Join bifurcations of one kind at one place to one of higher multiplicity.
+    joined: list[tuple[float, Located]] = []
+    for distance, each in sorted(located, key=lambda pair: pair[0]):
+        last = joined[-1] if joined else None
+        if last and last[1].kind is each.kind and distance - last[0] < TOGETHER * length:
+            joined[-1] = (last[0], replace(last[1], multiplicity=last[1].multiplicity + 1))
+        else:
+            joined.append((distance, each))
+    return [*joined]
 
 
 def _nearest(point: Point) -> float:
@@ -234,15 +234,3 @@ def _passing(step: BranchStep, indices: range, turn: float | None) -> Iterator[t
             point = step.branch_point(distance, index)
         yield distance, Located(kind, point, index, scale)
         index += 2 if paired else 1
-
-
-def _together(located: list[tuple[float, Located]], length: float) -> Iterator[tuple[float, object]]:
-    """Join bifurcations of one kind at one place to one of higher multiplicity."""
-    joined: list[tuple[float, Located]] = []
-    for distance, each in sorted(located, key=lambda pair: pair[0]):
-        last = joined[-1] if joined else None
-        if last and last[1].kind is each.kind and distance - last[0] < TOGETHER * length:
-            joined[-1] = (last[0], replace(last[1], multiplicity=last[1].multiplicity + 1))
-        else:
-            joined.append((distance, each))
-    yield from joined

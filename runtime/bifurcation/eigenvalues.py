@@ -15,21 +15,13 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
 
 from synchain.models.dynamics.equations import Equations
 
-DENSE = 2000
-"""Most states of which all eigenvalues are computed: their dense matrix has 32 MB (a choice)."""
-
-FEW = 12
-"""Number of eigenvalues of larger networks, unless `count` is given (a choice)."""
-
-SMALL = 64
-"""Most states of which matrices are dense (a choice)."""
-
+DENSE = 2000  # most states of which all eigenvalues are computed: their dense matrix has 32 MB (a choice)
+FEW = 12  # number of eigenvalues of larger networks, unless `count` is given (a choice)
+SMALL = 64  # most states of which matrices are dense (a choice)
+# Few eigenvalues are computed around this point, in units of the largest entry of J; 0 is an eigenvalue of each
+# shift.
 ASIDE = 1e-6
-"""Few eigenvalues are computed around this point, in units of the largest entry of J; 0 is an eigenvalue of each
-shift."""
-
-BLOCKS = 1e-11
-"""Largest difference between a Jacobian and its blocks, relative to its largest entry (a choice)."""
+BLOCKS = 1e-11  # largest difference between a Jacobian and its blocks, relative to its largest entry (a choice)
 
 
 def eigenvalues(jacobian: sparse.csc_array, mass: sparse.csc_array | None, count: int | None = None) -> np.ndarray:

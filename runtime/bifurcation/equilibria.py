@@ -25,23 +25,15 @@ from .kinds import BifurcationKind
 from .linearised import Linearised
 from .problems import GrowthNumbers, Matrix
 
-NOISE = 1e-14
-"""Residual that counts as zero, relative to the sizes of its terms: 45 rounding errors (a choice)."""
-
-LEAST_SCALE = 0.1
-"""Least scale of a component in lengths, relative to that of the largest component (a choice)."""
-
+NOISE = 1e-14  # residual that counts as zero, relative to the sizes of its terms: 45 rounding errors (a choice)
+LEAST_SCALE = 0.1  # least scale of a component in lengths, relative to that of the largest component (a choice)
+# Factor by which the scale of states near zero is lowered, and the ratio of rates at which it is low enough (a
+# choice).
 SHRINK = 64.0
-"""Factor by which the scale of states near zero is lowered, and the ratio of rates at which it is low enough (a choice)."""
-
+# States that are smaller than this part of the scale are zero: at a turn they are known to the root of rounding (a
+# choice).
 ORIGIN = 1e-7
-"""States that are smaller than this part of the scale are zero: at a turn they are known to the root of rounding (a choice)."""
-
-TINY = 1e-8
-"""A parameter without bounds that is smaller does not set its own length (a choice)."""
-
-REAL = 1e-7
-"""An eigenvalue whose imaginary part is smaller, relative to the largest, is real (a choice)."""
+TINY = 1e-8  # a parameter without bounds that is smaller does not set its own length (a choice)
 
 
 class Equilibria:

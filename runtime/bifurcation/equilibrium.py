@@ -7,12 +7,10 @@ The eigenvalues of M^-1 J decide stability: at rest the derivative of M is multi
    equilibria are not isolated.  With e = (1 … 1) along the coordinate, the common speed s is unknown too, and the step
    is normal to the shift: J dx - e ds = -(r - e s), e' dx = 0.  A speed other than zero is a rigid rotation.
 2. Singular Jacobians.  A conserved momentum makes a line of equilibria as well, free masses at any common speed: the
-step of
-   least squares and least norm leads to one of them near the start.
+   step of least squares and least norm leads to one of them near the start.
 3. Damping.  A step is halved until the weighted norm of the rates falls (Deuflhard, section 3.3).
 4. Pseudo-transient continuation.  Where Newton's method fails, implicit Euler steps (M/h - J) dx = r follow the motion
-from
-   the start; h grows as the rates fall, and Newton's method goes on from there (Kelley & Keyes).
+   from the start; h grows as the rates fall, and Newton's method goes on from there (Kelley & Keyes).
 5. Rounding.  A rate counts as zero relative to the sizes of its terms, and a tail of rates that has no root is refused.
 
 Sources: Kelley & Keyes, SIAM J. Numer. Anal. 35, 508 (1998); Seydel, Practical Bifurcation and Stability Analysis, 3rd
@@ -42,55 +40,37 @@ from ..sweeps.continued_start import StartValue, started
 from .eigenvalues import SMALL, ModeBlocks, eigenvalues
 from .linearised import Linearised
 
+# Most steps of Newton's method, and most halvings of one until the residual falls: 2^-40 of a step is rounding
+# (choices).
 MOST_STEPS, HALVINGS = 100, 40
-"""Most steps of Newton's method, and most halvings of one until the residual falls: 2^-40 of a step is rounding
-(choices)."""
-
-CLOSED = 1e-11
-"""Largest rate at an equilibrium, relative to the sizes of its terms: 45 000 rounding errors (a choice)."""
-
+CLOSED = 1e-11  # largest rate at an equilibrium, relative to the sizes of its terms: 45 000 rounding errors (a choice)
+# At a double or higher root each step of Newton's method leaves 1/4 of the rates or more: a root is multiple if each
+# of the last REPEATED steps leaves MULTIPLE (choices).
 MULTIPLE, REPEATED = 0.2, 3
-"""At a double or higher root each step of Newton's method leaves 1/4 of the rates or more: a root is multiple if each of
-the last REPEATED steps leaves MULTIPLE (choices)."""
-
+# Largest factor by which the last step of Newton's method may lower the rates at a root. At a root of multiplicity m
+# a step leaves (1 - 1/m)^m of the rates: 0 of a simple root, 1/4 at a fold. Along a tail x^-p, which has no root, it
+# leaves (1 + 1/p)^-p, more than 1/e = 0.37. 0.34 admits roots of a multiplicity up to 7.
 TAIL = 0.34
-"""Largest factor by which the last step of Newton's method may lower the rates at a root.
-
-At a root of multiplicity m a step leaves (1 - 1/m)^m of the rates: 0 of a simple root, 1/4 at a fold.  Along a tail
-x^-p, which has no root, it leaves (1 + 1/p)^-p, more than 1/e = 0.37.  0.34 admits roots of a multiplicity up to 7.
-"""
-
+# Most implicit Euler steps, and 1/h of the first in units of the largest slope of a rate (choices).
 MOST_RELAXED, FIRST_RATE = 500, 10.0
-"""Most implicit Euler steps, and 1/h of the first in units of the largest slope of a rate (choices)."""
-
+# An Euler step by which the rates grow more than WORSE times is repeated with h/4; Newton's method takes over where
+# they have fallen to NEWTON of the sizes of their terms (choices).
 WORSE, NEWTON = 1.5, 1e-6
-"""An Euler step by which the rates grow more than WORSE times is repeated with h/4; Newton's method takes over where
-they have
-fallen to NEWTON of the sizes of their terms (choices)."""
-
+# A scaled matrix counts as singular if its least pivot is below SINGULAR, some hundred rounding errors, of the
+# largest. It is solved with the damping DAMPED. Regular directions change by DAMPED squared only, which is near
+# rounding (choices).
 SINGULAR, DAMPED = 1e-13, 1e-7
-"""A scaled matrix counts as singular if its least pivot is below SINGULAR, some hundred rounding errors, of the
-largest. It
-is solved with the damping DAMPED. Regular directions change by DAMPED squared only, which is near rounding
-(choices)."""
-
-EVEN = 1e-15
-"""Speed of a shift that is rounding, relative to the largest size of a rate's terms."""
-
+EVEN = 1e-15  # speed of a shift that is rounding, relative to the largest size of a rate's terms
+# Size of an eigenvalue that counts as zero, relative to the largest: at a fold two solutions merge, and a rounding
+# error of 1e-16 moves the eigenvalue by its square root.
 ZERO = 1e-7
-"""Size of an eigenvalue that counts as zero, relative to the largest: at a fold two solutions merge, and a rounding
-error of
-1e-16 moves the eigenvalue by its square root."""
-
+# Size of an eigenvalue that is a rounding error, relative to the fastest rate at the equilibrium (a choice).
 LEAST = 1e-12
-"""Size of an eigenvalue that is a rounding error, relative to the fastest rate at the equilibrium (a choice)."""
-
+# Relative distance at which slopes are measured beside a state: at a fold those at the state itself may vanish (a
+# choice).
 BESIDE = 0.1
-"""Relative distance at which slopes are measured beside a state: at a fold those at the state itself may vanish (a
-choice)."""
-
+# Distances by which a shift is tried: for any unit of the state, some of them are neither tiny nor huge.
 SHIFTS = (7e-13, 7e-9, 7e-5, 0.7, 7e3, 7e7, 7e11)
-"""Distances by which a shift is tried: for any unit of the state, some of them are neither tiny nor huge."""
 
 REFUSED = {
     "rtol": "Newton's method ends at rounding",
@@ -492,8 +472,7 @@ class Search:
         limit = limits[-1]
         closed = gaps[-1] <= limit
         if not closed.all():
-            # The terms of a rate such as x' = v all vanish with v, so that it is never small beside them.  A state
-            # whose
+            # The terms of a rate such as x' = v all vanish with v, so that it is never small beside them.  A state whose
             # size changes no closed rate by more than its limit is rounding: set it to zero and look again.
             change = abs(_jacobian(self.network, self.state)) @ sparse.diags_array(np.abs(self.state)).tocsc()
             unnoticed = np.asarray((change[closed] > limit[closed][:, None]).sum(axis=0)).ravel() == 0
@@ -501,8 +480,7 @@ class Search:
             if not np.all(np.abs(self.left(rounded, self.speeds)) <= self.limits(rounded)):
                 return False
             self.state = rounded
-        # Refuse a tail of the rates that has no root: there the step that closes them lowers them by less than e
-        # (TAIL).
+        # Refuse a tail of the rates that has no root: the step that closes them lowers them by less than e (TAIL).
         last = int(np.argmax(np.all((gaps <= limits)[:, closed], axis=1)))
         levels = (gaps / np.where(limit > 0.0, limit, np.inf))[:, closed].max(axis=1, initial=0.0)
         end = levels[max(0, last - REPEATED) : last + 1]

@@ -18,9 +18,9 @@ from .normal_forms import first_lyapunov_coefficient
 from .results import Bifurcation
 from .switching import directions
 
+# Second value of the secant method that locates where cycles are born, relative to the range of the parameter, and
+# largest distance of the critical value there from that of the cycle, relative to its modulus (choices).
 FIRST_SHIFT, SAME_VALUE = 1e-4, 0.1
-"""Second value of the secant method that locates where cycles are born, relative to the range of the parameter, and
-largest distance of the critical value there from that of the cycle, relative to its modulus (choices)."""
 
 
 def bifurcation_at(problem: Equilibria | Cycles, located: Located) -> Bifurcation:

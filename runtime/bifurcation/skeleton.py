@@ -43,23 +43,16 @@ from .switching import SAME, permutations_of
 Range = tuple[float, float]
 """Ends of an interval."""
 
+# Number of motions that are searched for returns, their length and their transient in drive periods (choices).
 STARTS, LENGTH, DROPPED = 96, 200, 20
-"""Number of motions that are searched for returns, their length and their transient in drive periods (choices)."""
-
+# Sizes of the boxes of starts around the motion from the scene's own start, relative to the extent of that motion
+# (choices).
 SCALES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
-"""Sizes of the boxes of starts around the motion from the scene's own start, relative to the extent of that motion
-(choices)."""
-
-MOST_STEPS = 100_000
-"""Most steps of a motion in a drive period; one that takes more is left out (a choice)."""
-
-LOOSE = 1e-8
-"""Relative tolerance of these motions: returns are searched to CLOSE only (a choice)."""
-
+MOST_STEPS = 100_000  # most steps of a motion in a drive period; one that takes more is left out (a choice)
+LOOSE = 1e-8  # relative tolerance of these motions: returns are searched to CLOSE only (a choice)
+# Largest distance of a return and least distance between starts, relative to the extent of the motion, and most
+# starts for one period (choices).
 CLOSE, APART, TRIES = 0.05, 0.02, 12
-"""Largest distance of a return and least distance between starts, relative to the extent of the motion, and most starts
-for
-one period (choices)."""
 
 
 def skeleton(
@@ -153,7 +146,12 @@ def skeleton(
     # Search at evenly spread values: the middles of `count` equal parts of the grid.
     count = min(looks, len(grid))
     looked_at = sorted({int((2 * j + 1) * len(grid) / (2 * count)) for j in range(count)})
-    transient, seed = _transient(scene, transient), check_seed("rng", chosen(scene, "rng", rng, 0))
+    seed = check_seed("rng", chosen(scene, "rng", rng, 0))
+    if transient is None:  # that of the scene in drive periods, else DROPPED
+        length = chosen(scene, "transient", None, None)
+        unit = 1.0 if scene.time_unit == TimeUnit.PERIOD else scene.period or 1.0
+        transient = DROPPED if length is None else length / unit
+    transient = check_number("transient", transient, 0.0)
     if not without_drive(scene.equations, scene.parameters).forced:
         return Diagram(tuple(_resting(scene, name, grid, [grid[k] for k in looked_at], seed, ranges)))
     scene = scene.lone
@@ -204,15 +202,6 @@ def _resting(
             except ArithmeticError:
                 continue
     return branches + cycles
-
-
-def _transient(scene: Scene, transient: float | None) -> float:
-    """Return the drive periods before the search: those of the call, else of the scene, else DROPPED."""
-    if transient is not None:
-        return check_number("transient", transient, 0.0)
-    length = chosen(scene, "transient", None, None)
-    unit = 1.0 if scene.time_unit == TimeUnit.PERIOD else scene.period or 1.0
-    return DROPPED if length is None else length / unit
 
 
 def _box(scene: Scene, ranges: Mapping[str, Range]) -> np.ndarray:

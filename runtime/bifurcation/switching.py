@@ -27,21 +27,15 @@ from ..results.labels import States
 from .arclength import Point
 from .problems import BranchProblem, Matrix
 
+# Largest graphs of which automorphisms are listed, and most automorphisms (choices).
 MOST_NODES, MOST_AUTOMORPHISMS = 60, 2000
-"""Largest graphs of which automorphisms are listed, and most automorphisms (choices)."""
-
-MOST_SPACES = 300
-"""Most fixed spaces that are intersected (a choice)."""
-
+MOST_SPACES = 300  # most fixed spaces that are intersected (a choice)
+# Distance at which second derivatives are measured beside a branch point, in the metric of a problem (a choice).
 STEP = 1e-3
-"""Distance at which second derivatives are measured beside a branch point, in the metric of a problem (a choice)."""
-
+# Singular values that count as zero and the shift of inverse iteration, relative to a scale of the entries; most null
+# vectors of a sparse matrix (choices).
 NULL, SHIFT, MOST_VECTORS = 1e-6, 1e-12, 12
-"""Singular values that count as zero and the shift of inverse iteration, relative to a scale of the entries; most null vectors
-of a sparse matrix (choices)."""
-
-SAME = 1e-6
-"""Largest difference of vectors of one line, and of a state and its image (a choice)."""
+SAME = 1e-6  # largest difference of vectors of one line, and of a state and its image (a choice)
 
 
 def permutations_of(scene: Scene) -> list[np.ndarray]:
