@@ -9,6 +9,7 @@ Sources: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (201
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -33,7 +34,7 @@ from .orbits import OrbitProblem
 from .variational_integrator import VariationalIntegrator
 
 MERGED = 1e-9
-"""Two clusters count as one if they are never further apart than this distance (a choice)."""
+"""Two clusters count as one if no component is ever further apart than this part of its size (a choice)."""
 
 APPROACH = 0.5
 """Two clusters approach each other if their largest distance falls below this part of its earlier value (a choice)."""
@@ -138,8 +139,8 @@ class ClusterExponents(Labelled):
 
     @property
     def merged(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of clusters of equal nodes that were never more than 1e-9 apart, and so count as one cluster."""
-        return _pairs(self.separation < MERGED)
+        """Pairs of clusters of equal nodes that were never apart by 1e-9 of their states, and so count as one cluster."""
+        return _pairs(self.separation == 0.0)
 
     def as_dict(self) -> dict[str, object]:
         """Return the exponents for JSON.
@@ -250,15 +251,14 @@ def cluster_exponents(
     reporter = averaging.reporter()
     problem, integrator = _integrator(scene, partition, averaging.seed)
     orbit = problem.variation.orbit
-    alike = [[_alike(orbit, a, b) for b in range(orbit.n)] for a in range(orbit.n)]
     averaging = averaging.in_units(scene, problem.unit)
     reporter.total = averaging.length
     batches, dropped = Batches(problem.unit), round(averaging.transient)
-    gaps: list[np.ndarray] = []  # (clusters, clusters) after each unit of time: largest difference of a component
+    states: list[np.ndarray] = []  # states after each unit of time
 
     def advance() -> np.ndarray:
         growth = integrator.advance(problem.unit)
-        gaps.append(_separations(integrator.state[0], alike))
+        states.append(integrator.state[0])
         return growth
 
     with reporter:
@@ -270,10 +270,12 @@ def cluster_exponents(
         steps = integrator.error_of_steps(problem.unit)
 
     # drop the first half of the transient, then compare the largest distances in the two halves of the motion
-    apart, settled = np.max(gaps[dropped:], axis=0), np.array(gaps[dropped // 2 :])
+    gaps, ratios = _separations(orbit, np.array(states), dropped)
+    apart = np.where(ratios < MERGED, 0.0, gaps[dropped:].max(axis=0))
+    settled = gaps[dropped // 2 :]
     half = len(settled) // 2
     early, late = (part.max(axis=0, initial=0.0) for part in (settled[:half], settled[half:]))
-    approaching = _pairs((late < APPROACH * early) & (apart >= MERGED))
+    approaching = _pairs((late < APPROACH * early) & (apart > 0.0))
     if approaching:
         warn(
             f"cluster_exponents: found clusters that approach each other, {_text(approaching)}; expected settled ones, "
@@ -333,19 +335,22 @@ def _integrator(scene: Scene, partition: Clusters, seed: int) -> tuple[OrbitProb
     return problem, integrator
 
 
-def _alike(orbit: Equations, first: int, second: int) -> list[tuple[int, int]]:
-    """Return the places of the states of two clusters whose difference counts; none for nodes of different kinds."""
-    if orbit.kind_of[first] != orbit.kind_of[second]:
-        return []
-    count = len(orbit.node_at(first).continuous)
-    return list(zip(orbit.places[first][:count], orbit.places[second][:count], strict=True))
+def _separations(orbit: Equations, states: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the largest difference (k, clusters, clusters) of a component in states (k, any), and of its ratios.
 
-
-def _separations(state: np.ndarray, alike: list[list[list[tuple[int, int]]]]) -> np.ndarray:
-    """Return the largest difference (clusters, clusters) of a component, infinity for nodes of different kinds."""
-    return np.array(
-        [[max((abs(state[p] - state[q]) for p, q in pairs), default=np.inf) for pairs in row] for row in alike]
-    )
+    The ratios (clusters, clusters) are those to the size of the component from the state `first` on. Nodes of different
+    kinds are infinitely far apart.
+    """
+    gaps, ratios = np.full((len(states), orbit.n, orbit.n), np.inf), np.full((orbit.n, orbit.n), np.inf)
+    size = np.abs(states[first:]).max(axis=0)
+    for a, b in itertools.product(range(orbit.n), repeat=2):
+        if orbit.kind_of[a] == orbit.kind_of[b]:
+            count = len(orbit.node_at(a).continuous)
+            p, q = (list(orbit.places[c][:count]) for c in (a, b))
+            difference, larger = np.abs(states[:, p] - states[:, q]), np.maximum(size[p], size[q])
+            gaps[:, a, b] = difference.max(axis=1)
+            ratios[a, b] = (difference[first:] / np.where(larger > 0.0, larger, 1.0)).max()
+    return gaps, ratios
 
 
 def _text_of(block: Block) -> str:

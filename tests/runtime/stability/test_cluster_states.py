@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 
 from synchain import Field, Rates, Scene, cluster_exponents, exponents, run
-from synchain.graphs import Topology, clusters, from_matrix, topology, triangles
+from synchain.graphs import Topology, clusters, from_matrix, star, topology, triangles
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import clustered
 from synchain.results import ClusterExponents
@@ -371,3 +371,14 @@ def test_the_first_half_of_the_transient_may_bring_clusters_nearer() -> None:
     assert result.separation.max() == pytest.approx(4.0, rel=0.02)
     with pytest.warns(RuntimeWarning, match="clusters that approach each other, 1 and 2; expected"):
         cluster_exponents(scene, (0, 1, 0, 1), transient=0, periods=30)
+
+
+@pytest.mark.parametrize("s", [1e-12, 1e6])
+def test_clusters_merge_in_any_unit_of_state(s: float) -> None:
+    """A Rössler star: the hub and its leaves move apart at sigma = 0.01, and alike at 0.5."""
+    node = Field({"x": "-y - z", "y": "x + 0.2*y", "z": "0.2*s + z*(x/s - 9)"}, parameters={"s": s})
+    start = {"x": [s, 2 * s, 2 * s, 2 * s], "y": 0.5 * s, "z": 0.1 * s}
+    scene = Scene(node, "x->x", star(4), initial=start, parameters={"s": s})
+    apart, alike = (cluster_exponents(scene, [0, 1, 1, 1], sigma=sigma, periods=100) for sigma in (0.01, 0.5))
+    assert (apart.merged, alike.merged) == ((), ((0, 1),))
+    assert 10 * s < apart.separation[0, 1] < 100 * s
