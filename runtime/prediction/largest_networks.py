@@ -25,8 +25,6 @@ from synchain.models.graphs.families import topology
 from .stable_ranges import StableRange, exact_ranges, widen
 from .synchronisability import possible
 
-__all__ = ["LargestNetwork", "Method", "SizeUnit", "eigenratio", "largest_network"]
-
 
 class SizeUnit(StrEnum):
     NODES = "nodes"

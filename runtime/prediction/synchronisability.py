@@ -35,18 +35,6 @@ from .intervals import find
 from .mode_windows import NetworkMode, has_loose_parts, transversal_modes
 from .stable_ranges import StableRange, exact_ranges, widen
 
-__all__ = [
-    "Answer",
-    "OneWay",
-    "Verdict",
-    "Window",
-    "expect_no_repulsion",
-    "possible",
-    "verdict",
-    "windows",
-    "windows_complex",
-]
-
 
 class Answer(StrEnum):
     NO = "no"

@@ -38,8 +38,6 @@ from .averages import Averaging, Batches, document_keywords
 from .slow_motion import warn_of_slow_motion
 from .tangent_frame import TangentFrame
 
-__all__ = ["Lyapunov", "lyapunov_spectrum"]
-
 CALL = 8
 """Number of periods of the transient in one call; growth without bound is seen from call to call (a choice)."""
 

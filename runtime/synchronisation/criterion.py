@@ -19,21 +19,6 @@ from ..engines.step_control import scale_of_atol
 from .synchronous_motion import SynchronousMotion, columns_of
 from .trials import Outcome
 
-__all__ = [
-    "IN_CRITERION",
-    "PAPER",
-    "QUICK",
-    "AppliedCriterion",
-    "Criterion",
-    "applied",
-    "checked",
-    "errors",
-    "final_errors",
-    "offsets",
-    "preset",
-    "resolved",
-]
-
 TOLERANCE, REACH = 1e-3, 0.5
 """Default tolerance and reach, relative to the extent of the synchronous motion (a choice)."""
 
