@@ -85,6 +85,7 @@ def _zero_at_kinks(e: sp.Expr) -> sp.Expr:
     """Write sign(w)/|w|**q as sign(w)/(|w|**q + NOTHING), which is 0 in place of 0/0 at w = 0.
 
     The second derivative of |w|**(3/2) is infinite at w = 0, where slip begins and ends; deviations pass this instant.
+    The first derivative of sqrt(|w|) is infinite there; Jacobians of stiff methods are evaluated at this start.
     A power q of parameters may have either sign: sign(w) |w|**q becomes sign(w) (|w| + NOTHING)**q.
     """
     e = e.replace(

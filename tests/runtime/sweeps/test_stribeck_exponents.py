@@ -87,3 +87,11 @@ def test_infinite_slopes_at_rest_are_refused_before_a_run(text: str) -> None:
     with pytest.raises(ValueError, match=words):
         sc.exponents(powers(text), [0.1])
     assert sc.run(powers(text), sigma=0.1, show_progress=False).success
+
+
+def test_stiff_methods_start_where_a_slope_is_infinite() -> None:
+    """The slope of sqrt(|v|) is infinite at the start v = 0, where the Jacobian of the first step is evaluated."""
+    node = sc.Field({"v": "-sqrt(abs(v))*sign(v) + sin(t)"}, initial={"v": 0.0})
+    given = sc.Scene(node, None, transient=0, window=6, time_unit="time", rtol=1e-9, atol=1e-11)
+    ends = [sc.run(given.replace(integrator=name), show_progress=False).end for name in ("rodas5p", "dop853")]
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-7)
