@@ -6,7 +6,7 @@ of this module therefore return networks of any size at the cost of one node and
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, count
 
@@ -16,7 +16,7 @@ from ..inputs.names import LinkName, NodeName
 from ..mechanics import calculus
 from ..mechanics.components import Block, Edge, Node
 from ..mechanics.rows import Law
-from .equations import Ends, Equations, Layer
+from .equations import Equations, Layer
 from .variational import expect_continuous
 
 Along = tuple[tuple[sp.Symbol, sp.Symbol], ...]
@@ -41,7 +41,7 @@ def lifted(equations: Equations, names: Iterable[str] = ()) -> Lift:
     link: P_2, k_1_2.
     """
     _check(equations)
-    bases = {name: _holder(equations, name)[0] for name in names}
+    bases = {name: _base(equations, name) for name in names}
     # The deviation of x is d_x, that of p seed_p. A network that is lifted twice has these names: take d2_x, seed2_p.
     taken = {s.name for node in equations.nodes for s in (*node.state, *node.parameters)}
     taken |= {s.name for edge in equations.edges for s in edge.parameters}
@@ -112,57 +112,43 @@ def lifted(equations: Equations, names: Iterable[str] = ()) -> Lift:
     )
 
 
-def derivative(equations: Equations, name: str) -> Equations:
-    """Return the network whose rates, and whose mass matrix if it has one, are the derivatives by a parameter.
+def derivative(equations: Equations, name: str) -> tuple[Equations, dict[str, float]]:
+    """Return the network whose rates, and whose masses if it has any, are the derivatives by a parameter; and its seeds.
 
-    The state and the parameters stay the same. `name` may be a parameter of one node or one link: P_2, k_1_2.
+    The state stays the same. The seeds are further parameters: 1 for the parameter, 0 for the same parameter of other nodes
+    and links. `name` may be a parameter of one node or one link: P_2, k_1_2.
     """
-    _check(equations)
-    base, holder = _holder(equations, name)
-    symbol = sp.Symbol(base, real=True)
+    lift = lifted(equations, [name])
 
-    def node(each: Node, acts: bool) -> Node:
-        size = len(each.state)
-        inertia = each.inertia or (((sp.S.Zero,) * size,) * size if equations.inertial else ())
-        by = symbol if acts else sp.Dummy(real=True)
-        inertia = tuple(tuple(calculus.derivative(e, by) for e in row) for row in inertia)
-        return Node(each.state, tuple(calculus.derivative(e, by) for e in each.rhs), each.parameters, inertia=inertia)
+    # The rates of deviations that are zero are seed r_p, and the lower left block of their masses is seed M_p.
+    def at_zero(ends: Iterable[tuple[sp.Symbol, ...]]) -> dict[sp.Symbol, sp.Expr]:
+        return {d: sp.S.Zero for end in ends for d in end[len(end) // 2 :]}
 
-    def edge(each: Edge, of_target: bool, of_source: bool) -> Edge:
-        symbols = [symbol] if of_target else []
-        symbols += [s for s, of in each.theirs if of == symbol] if of_source else []
-        along = tuple((s, sp.S.One) for s in symbols)
-        inertia = tuple(tuple(_changes(row, along) for row in block) for block in each.inertia)
-        return replace(each, rhs=_changes(each.rhs, along), inertia=inertia)
+    def lower(rates: tuple[sp.Expr, ...], zeros: dict[sp.Symbol, sp.Expr]) -> tuple[sp.Expr, ...]:
+        return tuple(e.xreplace(zeros) for e in rates[len(rates) // 2 :])
 
-    if isinstance(holder, LinkName):  # the links of that name alone
-        layer = equations.numbered[base]
-        acting = tuple(each for each in layer.links if layer.name(base, each) == name)
-        layers: tuple[Layer, ...] = (replace(layer.map(lambda e: edge(e, True, False)), links=acting),)
-        return replace(equations, nodes=tuple(node(each, False) for each in equations.nodes), layers=layers)
-    if holder is None:
-        return equations.map_templates(lambda each: node(each, True), lambda each: edge(each, True, True))
-    # One node: its template becomes a kind of its own, beside the kinds of all others.
-    kind, last = equations.kind_of[holder.index], len(equations.nodes)
-    kind_of = (*equations.kind_of[: holder.index], last, *equations.kind_of[holder.index + 1 :])
-    nodes = (*(node(each, False) for each in equations.nodes), node(equations.nodes[kind], True))
-    present = [k for k in range(last + 1) if k in kind_of]  # the node may have been the only one of its kind
-    renamed = {k: present.index(k) for k in present}
+    def lower_left(block: Block, zeros: dict[sp.Symbol, sp.Expr]) -> Block:
+        return tuple(tuple(e.xreplace(zeros) for e in row[: len(row) // 2]) for row in block[len(block) // 2 :])
 
-    def split(pairs: Iterable[tuple[Ends, Edge]]) -> Iterator[tuple[Ends, Edge]]:
-        for (target, source), each in pairs:
-            for t in (target, last) if target == kind else (target,):
-                for s in (source, last) if source == kind else (source,):
-                    if t in renamed and s in renamed:
-                        yield (renamed[t], renamed[s]), edge(each, t == last, s == last)
+    def node(each: Node, both: Node) -> Node:
+        zeros, size = at_zero([both.state]), len(each.state)
+        massless = ((sp.S.Zero,) * size,) * size if equations.inertial else ()
+        inertia = lower_left(both.inertia, zeros) or massless
+        return Node(each.state, lower(both.rhs, zeros), both.parameters, inertia=inertia)
 
-    listed = equations.without_fields()
-    return replace(
-        listed,
-        nodes=tuple(nodes[k] for k in present),
-        kind_of=tuple(renamed[k] for k in kind_of),
-        layers=tuple(replace(each, edge_of=tuple(split(each.edge_of))) for each in listed.layers),
-    )
+    def edge(each: Edge, both: Edge) -> Edge:
+        zeros = at_zero(both.end_states)
+        inertia = tuple(lower_left(block, zeros) for block in both.inertia)
+        rates = lower(both.rhs, zeros)
+        return replace(both, here=each.here, there=each.there, beyond=each.beyond, rhs=rates, inertia=inertia)
+
+    layers = []
+    for layer, both in zip(equations.layers, lift.equations.layers, strict=True):
+        pairs = zip(layer.edge_of, both.edge_of, strict=True)
+        layers.append(replace(both, edge_of=tuple((ends, edge(each, twin)) for (ends, each), (_, twin) in pairs)))
+    nodes = tuple(map(node, equations.nodes, lift.equations.nodes))
+    seeds = dict.fromkeys((p for p in lift.equations.parameters if p not in equations.parameters), 0.0)
+    return replace(lift.equations, nodes=nodes, layers=tuple(layers)), {**seeds, lift.seeds[name]: 1.0}
 
 
 def _check(equations: Equations) -> None:
@@ -180,15 +166,15 @@ def _check(equations: Equations) -> None:
     expect_continuous(equations)
 
 
-def _holder(equations: Equations, name: str) -> tuple[str, NodeName | LinkName | None]:
-    """Return the symbol's name of a parameter, P of P_2, k of k_1_2, and its node or link if it belongs to one."""
+def _base(equations: Equations, name: str) -> str:
+    """Return the symbol's name of a parameter, P of P_2 and k of k_1_2."""
     if name not in equations.parameters:
         raise ValueError(f"derivative of a network: found {name!r}; expected one of {', '.join(equations.parameters)}")
-    holder: NodeName | LinkName | None = None
-    if name in equations.single:
-        holder = LinkName.parse(name)
-        holder = holder if holder is not None and holder.base in equations.numbered else NodeName.parse(name)
-    return (name, None) if holder is None else (holder.base, holder)
+    if name not in equations.single:
+        return name
+    link = LinkName.parse(name)
+    holder = link if link is not None and link.base in equations.numbered else NodeName.parse(name)
+    return name if holder is None else holder.base
 
 
 def _changes(expressions: Sequence[sp.Expr], along: Along) -> tuple[sp.Expr, ...]:

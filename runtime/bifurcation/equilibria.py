@@ -53,7 +53,9 @@ class Equilibria:
         self.size = len(state)
         self.values: Mapping[str, float] = dict(scene.parameters)
         self.network = Linearised.of(equations, self.values)
-        self.by_parameters = [Linearised.of(derivative(equations, name), self.values) for name in names]
+        slopes = [derivative(equations, name) for name in names]
+        self.seeds = [seeds for _, seeds in slopes]
+        self.by_parameters = [Linearised.of(slope, {**self.values, **seeds}) for slope, seeds in slopes]
         # Shifts: columns of ones, of which the first node is pinned.
         places = np.cumsum([0, *(len(equations.holders(name)) for name in equations.components)])
         self.first_of, self.ones = places[:-1], np.zeros((self.size, len(shifts)))
@@ -145,8 +147,12 @@ class Equilibria:
         state, speeds, values = self.split(z)
         key = z[len(z) - len(self.names) :].tobytes()
         if self.last[0] != key:
-            self.last = key, self.network.at(values), [each.at(values) for each in self.by_parameters]
+            self.last = key, self.network.at(values), self.slopes_at(values, self.by_parameters)
         return state, speeds, *self.last[1:]
+
+    def slopes_at(self, values: Mapping[str, float], by_parameters: list[Linearised]) -> list[Linearised]:
+        """Return derivatives by each parameter with the values of all parameters."""
+        return [each.at({**values, **seeds}) for each, seeds in zip(by_parameters, self.seeds, strict=True)]
 
     def linearise(self, z: np.ndarray) -> tuple[np.ndarray, Matrix]:
         """Return the remaining rates and pins, and their derivatives."""

@@ -71,7 +71,7 @@ class EquilibriumCurve(CriticalCurve):
         def second(vector: np.ndarray) -> sparse.csc_array:
             """Return the derivatives (states, n + 2) of J v by y and both parameters."""
             both = np.append(state, vector)
-            mixed = np.column_stack([each.at(values).rates(both) for each in by_parameters])
+            mixed = np.column_stack([each.rates(both) for each in base.slopes_at(values, by_parameters)])
             curvature = rates.at(values).jacobian(both)
             curvature.resize(base.size, self.size)
             return sparse.hstack([curvature, sparse.csc_array(mixed)], format="csc")
@@ -86,7 +86,7 @@ class EquilibriumCurve(CriticalCurve):
             heavy = sparse.eye_array(base.size, format="csc") if mass is None else mass
             matrix = sparse.block_array([[slopes, -heavy], [k * heavy, slopes]], format="csc")
             bent, by_number = sparse.vstack([second(a), second(u)]), np.append(np.zeros(base.size), heavy @ a)
-            by_mass = [] if mass is None else [each.at(values).mass(state) for each in base.by_parameters]
+            by_mass = [] if mass is None else [each.mass(state) for each in base.slopes_at(values, base.by_parameters)]
             moved = [np.zeros(len(w)) if m is None else np.append(-(m @ u), k * (m @ a)) for m in by_mass]
             if moved:
                 bent = bent + sparse.hstack([sparse.csc_array((len(w), self.size)), np.column_stack(moved)])

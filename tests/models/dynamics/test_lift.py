@@ -79,8 +79,9 @@ def test_a_lift_moves_deviations_as_neighbouring_motions_differ(name: str) -> No
 def test_a_derivative_by_a_parameter_is_that_of_rates_and_masses(name: str) -> None:
     scene, parameter = SCENES[name]
     equations, values = scene.equations, dict(scene.parameters)
-    slope = Linearised.of(derivative(equations, parameter), values)
-    assert derivative(equations, parameter).state == equations.state
+    network, seeds = derivative(equations, parameter)
+    slope = Linearised.of(network, values | seeds)
+    assert network.state == equations.state
     x, h = np.random.default_rng(2).normal(size=equations.dimension), 1e-5
     ahead, behind = (Linearised.of(equations, values | {parameter: values[parameter] + e}) for e in (h, -h))
     np.testing.assert_allclose(slope.rates(x), (ahead.rates(x) - behind.rates(x)) / (2 * h), atol=1e-8)
