@@ -124,7 +124,8 @@ def equilibria(
         Seed of the random starts, or a NumPy Generator that gives it; by default that of the scene.
     ranges : mapping of str to (float, float), optional
         Components and the ends of their random starts.  By default angles start anywhere, other components within 1, 2, 4
-        and 8 times their largest initial state.
+        and 8 times their largest initial state; of components that start at 0, times the least distance that changes a
+        rate by the size of its terms.
     parameters : mapping of str to float, optional
         Parameters of the scene to set, for names that are keywords already.
     **more : float
@@ -162,7 +163,7 @@ def equilibria(
     scene = Given(equilibria, parameters, more, REFUSED).scene(scene)
     network, first = Linearised.of(resting_equations("equilibria", scene), scene.parameters), np.array(scene.y0)
     names, shifts = shifted_components(scene.equations, network, first)
-    starts, scales = _starts(scene, seed, ranges)
+    starts, scales = _starts(scene, network, seed, ranges)
     known = Known(scene, shifts, scales)
     found: list[Equilibrium] = []
     for start in (first, *starts):
@@ -183,15 +184,27 @@ def equilibria(
     return EquilibriumList(found, stopped=False)
 
 
-def _starts(scene: Scene, seed: int, ranges: Mapping[str, tuple[float, float]] | None) -> tuple[np.ndarray, np.ndarray]:
+def _starts(
+    scene: Scene, network: Linearised, seed: int, ranges: Mapping[str, tuple[float, float]] | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Return random starts (STARTS, states), and the scale (states,) of each state."""
     states, first = States.of(scene), np.array(scene.y0)
     size = len(first)
-    sizes = np.array([np.abs(first[states.rows == row]).max() for row in range(len(states.components))])
-    sizes = np.where(sizes > 0.0, sizes, sizes.max() or 1.0)
-    scales = sizes[states.rows]
-    angles = np.isfinite(Known(scene, np.zeros((size, 0)), scales).periods)
-    scales = np.where(angles, 1.0, scales)
+    angles = np.isfinite(Known(scene, np.zeros((size, 0)), np.ones(size)).periods)
+    members = [states.rows == row for row in range(len(states.components))]
+    sizes = np.where(angles, 1.0, np.abs(first))
+    scales = np.array([sizes[each].max() for each in members])[states.rows]
+    # A component that starts at 0 has the size that changes a rate by the size of its terms, where others are away from 0.
+    for _ in members:
+        beside = first + scales * np.cos(1.0 + np.arange(size))
+        terms, slopes = network.term_sizes(beside), abs(network.jacobian(beside)).tocoo()
+        noticed = np.full(size, np.inf)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distances = terms[slopes.row] / slopes.data
+        np.minimum.at(noticed, slopes.col, np.where(distances > 0.0, distances, np.inf))
+        least = np.array([noticed[each].min() for each in members])[states.rows]
+        scales = np.where((scales == 0.0) & np.isfinite(least), least, scales)
+    scales[scales == 0.0] = scales.max() or 1.0
     spread = np.resize(SCALES, STARTS)[:, None] * scales
     spread[:, angles] = np.pi
     low, high = first - spread, first + spread
