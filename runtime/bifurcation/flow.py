@@ -294,7 +294,9 @@ class ContactFlow:
         """Return the motion from a state with its slip states, which belong to the states of the motion."""
         full = self._with_slips(values, state[None]) if len(state) == self.size else state[None]
         integrator = self._integrator(values, full)
-        integrator.control[Control.ATOL] = LEAST * TOLERANCE
+        integrator.control[Control.ATOL] = (
+            LEAST * TOLERANCE * min(float(np.abs(full[:, : self.size]).max()) or 1.0, 1.0)
+        )
         return integrator, self._functions(values)
 
     def _integrator(self, values: Mapping[str, float], states: np.ndarray) -> VariationalIntegrator:
@@ -333,7 +335,7 @@ class ContactFlow:
 
     def advance(self, values: Mapping[str, float], states: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Integrate the states; the deviations come along."""
-        return self.linearise(values, states, times, np.ones(self.size)).states
+        return self.linearise(values, states, times, np.abs(states).max(axis=0)).states
 
     def linearise(self, values: Mapping[str, float], states: np.ndarray, times: np.ndarray, scale: np.ndarray) -> Image:
         """Integrate each segment with all its deviations."""

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
+from scipy.optimize import brentq
 
 import synchain as sc
 from synchain.runtime.bifurcation.skeleton import near_returns, starts_of
@@ -246,3 +248,42 @@ def test_a_beam_buckles_by_millimetres() -> None:
     branch = sc.follow(point, "P", to=200.0)
     assert sorted(branch[k].state[0] for k in (0, -1)) == pytest.approx([-1e-3, 1e-3], rel=1e-9)
     assert [each.stable for each in branch].count(False) == 1
+
+
+@pytest.mark.parametrize(("size", "time"), [(1.0, 1.0), (1e3, 1e-6), (1e-6, 1e-6)])
+def test_a_relay_switches_at_its_zero_in_any_unit(size: float, time: float) -> None:
+    """(d/dt + 1)^3 x = -sign(x): the half period h and the state at the switch follow from expm."""
+    matrix = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, -3.0, -3.0]])
+
+    def at_switch(h: float) -> np.ndarray:
+        flow = expm(h * matrix)
+        return np.linalg.solve(np.eye(3) + flow, np.linalg.solve(matrix, (flow - np.eye(3))[:, 2]))
+
+    period = 2.0 * brentq(lambda h: at_switch(h)[0], 1.0, 6.0, xtol=1e-15)
+    rates = {"p": "q/T", "q": "r/T", "r": "(-p - 3*q - 3*r - k*S*sign(p))/T"}
+    values = {"k": 1.0, "S": size, "T": time}
+    relay = sc.Field(rates, parameters=values, contact="set-valued", initial={"p": 0.3 * size, "q": 0.0, "r": 0.0})
+    orbit = sc.periodic_orbit(sc.Scene(relay, transient=40))
+    assert orbit.period / time == pytest.approx(period, rel=1e-11)
+
+
+@pytest.mark.parametrize(("size", "time"), [(1.0, 1.0), (1e3, 1e3), (1e6, 1e-6), (1e-6, 1e6)])
+def test_the_equilibria_of_a_model_that_starts_at_zero_are_found_in_any_unit(size: float, time: float) -> None:
+    """A mass on a spring carries two pendula, each of which hangs down or stands up."""
+    values = {
+        "l": 0.4 * size,
+        "g": 9.81 * size / time**2,
+        "k": 300.0 / time**2,
+        "c": 2.0 / time,
+        "d": 0.05 * size**2 / time,
+    }
+    beam = sc.Lagrangian(
+        "5*v**2/2 + ((v + l*w*cos(a))**2 + (l*w*sin(a))**2 + (v + l*u*cos(b))**2 + (l*u*sin(b))**2)/2",
+        "k*x**2/2 - g*l*(cos(a) + cos(b))",
+        {"x": "-c*v", "a": "-d*w", "b": "-d*u"},
+        coordinates={"x": "v", "a": "w", "b": "u"},
+        parameters=values,
+        initial={"x": 0.0, "a": 0.1, "b": -0.2},
+    )
+    angles = [each.state[1:3] for each in sc.equilibria(sc.Scene(beam))]
+    assert sorted(np.round(np.cos(angles), 9).tolist()) == [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]]
