@@ -331,6 +331,8 @@ def _jacobian(network: Linearised, state: np.ndarray) -> sparse.csc_array:
     """Return the Jacobian; ArithmeticError where an entry is no number."""
     jacobian = network.jacobian(state)
     if not np.isfinite(jacobian.data).all():
+        if not np.isfinite(network.rates(state)).all():
+            raise ArithmeticError("equilibrium: met a rate that overflows, or has no value; start elsewhere")
         raise ArithmeticError(
             "equilibrium: met a rate whose slope is infinite, or has no value, as that of sqrt(x) at 0; Newton's method and "
             "eigenvalues need slopes; start elsewhere"

@@ -244,7 +244,7 @@ def _started(scene: Scene, start: StartValue) -> Scene:
     names = tuple(name for name in scene.components if name not in scene.equations.modes)
     if isinstance(start, list | tuple | np.ndarray) and is_row(start):
         try:
-            numbers = np.array(start, dtype=float).ravel()
+            numbers = np.array([*map(float, np.array(start).ravel().tolist())])  # of complex numbers a TypeError
         except (TypeError, ValueError):
             numbers = np.full(1, np.nan)
         if len(numbers) == len(scene.components) and scene.n > 0 and len(names) < len(scene.components):

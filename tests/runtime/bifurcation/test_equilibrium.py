@@ -58,6 +58,11 @@ def test_an_infinite_slope_is_met_in_words(start: dict[str, float]) -> None:
         sc.equilibrium(scene)
 
 
+def test_a_rate_that_overflows_is_refused_as_such() -> None:
+    with pytest.raises(ArithmeticError, match="met a rate that overflows, or has no value; start elsewhere"):
+        sc.equilibrium(sc.Scene("van_der_pol"), [1e300, 0.0])
+
+
 def test_machines_whose_powers_do_not_add_up_to_zero_turn_together() -> None:
     """The sum of the powers balances the damping: w = 2 mean(P)."""
     result = sc.equilibrium(grid(0.7, -0.3))

@@ -251,6 +251,7 @@ def test_what_is_refused() -> None:
             r"start: found \[0.1\]; expected a number for each of x, v",
         ),
         (lambda s, o: periodic_orbit(s, 2, ["a", 1]), ValueError, "expected a number for each of x, v"),
+        (lambda s, o: periodic_orbit(s, 2, np.array([1j, 1])), ValueError, "expected a number for each of x, v"),
         (lambda s, o: periodic_orbit(s, 2, [np.nan, 0]), ValueError, "expected a number for each of x, v"),
         (lambda s, o: stability_end(o, "a", 1), ValueError, "low = 'a'; expected a finite strength alpha"),
         (lambda s, o: stability_end(o, 0.1, np.inf), ValueError, "high = inf; expected a finite strength alpha"),
