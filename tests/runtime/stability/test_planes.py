@@ -296,7 +296,7 @@ ALONE = Scene("duffing", SPRING, ring(4))
         (lambda: plane(SCENE, k=[0, 1], d=[0, 1]), "unknown parameter or keyword 'd' of plane"),
         (lambda: plane(SCENE, k=[0, 1], delta=[-1, 1]), "delta"),
         (lambda: plane(SCENE, [0, 1], [0, 1]), "found 2 layers of links, so that a mode has as many strengths"),
-        (lambda: msf(SCENE), r"exponents\(scene, alpha\) takes a column for each layer, or a matrix"),
+        (lambda: msf(SCENE), "exponents(scene, alpha) takes a column for each layer, or a matrix"),
         (lambda: plane(SCENE, [0, 1], k=[0, 1]), "found 2 layers of links"),
         (lambda: exponents(SCENE, [0, 1]), "found 2 layers of links"),
         (lambda: exponents(ALONE, [[0.1, 0.2]]), "array of shape (1, 2)"),
