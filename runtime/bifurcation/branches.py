@@ -222,6 +222,9 @@ def _bounds(
         low, high = (low, float(to)) if to > begin else (float(to), high)
     if not low <= begin <= high:
         raise ValueError(f"within: found {name} = {begin:g} of the first solution outside; expected it inside")
+    outside = next((value for value in ends if not low <= value <= high), None)
+    if outside is not None:
+        raise ValueError(f"values: found {outside:g} outside of within; expected values from {low:g} to {high:g}")
     return low, high
 
 

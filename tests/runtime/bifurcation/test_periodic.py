@@ -259,6 +259,11 @@ def test_what_is_refused() -> None:
         (lambda s, o: follow(o, "omega", values=[]), ValueError, r"values: found \[\]; expected at least one number"),
         (lambda s, o: follow(o, "omega", values=[1.15, 1.16, 1.1]), ValueError, "rising or falling all the way"),
         (
+            lambda s, o: follow(o, "omega", within=(1.1, 1.2), values=[1.12, 1.3]),
+            ValueError,
+            "values: found 1.3 outside of within; expected values from 1.1 to 1.2",
+        ),
+        (
             lambda s, o: follow(o, "omega", values=["a"]),
             ValueError,
             r"values: found \['a'\]; expected finite numbers for omega",
