@@ -175,7 +175,8 @@ def mechanical(pick: Pick) -> Drawn:
             mode = sp.Dummy("s", real=True)
             at_rest = moving.xreplace({W: sp.S.Zero})
             text = str(sp.sign(W) * moving.xreplace({W: sp.Abs(W)})).replace("Abs", "abs")
-            used = {s: 0.5 for s in (moving.free_symbols | sp.sympify(static or 0).free_symbols) - {W}}
+            # values above 1: the default of static friction, a product, is then above that of slow slip
+            used = {s: 1.5 for s in (moving.free_symbols | sp.sympify(static or 0).free_symbols) - {W}}
             law = sc.friction_law(text, used, static=None if static is None else str(static))
             pull = [-load * sliding.diff(w) for w in v]
             size = moving.xreplace({W: mode * sliding})
@@ -302,8 +303,10 @@ def structure(seed: int) -> Structure:
     name = node.state[linked].name
     load, bounce = (number(pick, *span) for span in ((0.05, 0.6), (0.2, 1.0)))
     rubs, stops = joined and maybe(pick, 0.7), joined and maybe(pick, 0.5)
+    static = sp.Rational(6, 5) if seed % 2 else sp.S.One
     if node.coordinates:
-        speed, law = node.state[target := linked + node.coordinates].name, sc.friction_law("sign(w)")
+        speed = node.state[target := linked + node.coordinates].name
+        law = sc.friction_law("sign(w)", static=str(static)) if static > 1 else sc.friction_law("sign(w)")
         of_link: list[Any] = [sc.Friction(f"{speed}_j - {speed}_i", load, law)] if rubs else []
         of_link += [sc.Stop(f"{name}_j - {name}_i + 3/5", bounce)] if stops else []
         numbers = {"k": 0, **{s.name: 0.5 for s, used in ((load, rubs), (bounce, stops)) if used}}
@@ -336,7 +339,13 @@ def structure(seed: int) -> Structure:
             for m, side in ends:
                 push[m * d + target] = -side * load
             rows.append(
-                Row("sign", sp.Add(*(side * states[m][target] for m, side in ends)), tuple(push), owner=(LINK, 0))
+                Row(
+                    "sign",
+                    sp.Add(*(side * states[m][target] for m, side in ends)),
+                    tuple(push),
+                    static,
+                    owner=(LINK, 0),
+                )
             )
         if stops:
             gap = sp.Add(sp.Rational(3, 5), *(side * states[m][linked] for m, side in ends))
