@@ -14,7 +14,7 @@ from typing import Literal, TypedDict, Unpack, overload
 
 import numpy as np
 
-from synchain.models.inputs.checks import check_number, listed, short_repr, typed_repr
+from synchain.models.inputs.checks import check_number, check_positive, listed, short_repr, typed_repr
 from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.names import expect_free
 from synchain.models.scenes.scene import Scene
@@ -170,6 +170,8 @@ def follow(
         )
     if direction not in SIGNS:
         raise ValueError(f"direction: found {direction!r}; expected 'both', 'up' or 'down'")
+    if vector and not (isinstance(first, Bifurcation) and first.kind in (*BORN, *LEFT)):
+        raise ValueError(f"vector: found {vector!r}; expected 0 for a branch that leaves no bifurcation")
     if not isinstance(name, str):
         if not isinstance(first, Bifurcation) or not isinstance(within, Mapping | None):
             raise ValueError(
@@ -181,11 +183,15 @@ def follow(
     scene = (first.solution if isinstance(first, Bifurcation) else first).scene
     _check_name(scene, name)
     # The range of the parameter is its unit of length.
+    to = None if to is None else check_number("to", to)
     requested = [] if values is None else checked_values(scene, name, values)
     begin, bounds = scene.parameters[name], _bounds(name, scene.parameters[name], to, requested, within)
+    if (parameter := scene.model.parameter(name)) is not None:
+        for bound in bounds:
+            parameter.check(name, bound)
     size = max(abs(bounds[1] - bounds[0]), *(abs(bound - begin) for bound in bounds))
     size = size if 0.0 < size < math.inf else abs(begin) or 1.0
-    largest = LARGEST_STEP if largest_step is None else check_number("largest_step", largest_step, 0.0) / size
+    largest = LARGEST_STEP if largest_step is None else check_positive("largest_step", largest_step) / size
     ends = (bounds,) if longest_period is None else (_periods(first, longest_period), bounds)
     limits = Limits(ends, MOST, min(FIRST_STEP, largest), largest, requested)
     # Follow the branch both ways, or one way.
@@ -208,18 +214,20 @@ def _bounds(
     name: str, begin: float, to: float | None, requested: list[float], within: tuple[float, float] | None
 ) -> tuple[float, float]:
     """Return the bounds of a parameter."""
-    if to is not None and check_number("to", to) == begin:
-        raise ValueError(f"to: found {to!r}, the value of the first solution; expected another value")
-    ends = [*requested, *([] if to is None else [float(to)])]
+    if to == begin:
+        raise ValueError(f"to: found {to:g}, the value of the first solution; expected another value")
+    ends = [*requested, *([] if to is None else [to])]
     if within is None:
         if not ends:
             raise ValueError(f"follow: found no end for {name}; expected to=, values= or within=")
         return min(begin, *ends), max(begin, *ends)
-    if len(within) != 2 or not within[0] < within[1]:
+    low, high = (check_number("within", each) for each in within) if len(within) == 2 else (0.0, 0.0)
+    if not low < high:
         raise ValueError(f"within: found {short_repr(within)}; expected two numbers, the lower one first")
-    low, high = (check_number("within", each) for each in within)
     if to is not None:
-        low, high = (low, float(to)) if to > begin else (float(to), high)
+        if not low <= to <= high:
+            raise ValueError(f"to: found {to:g}, outside of within={short_repr(within)}; expected a value inside")
+        low, high = (low, to) if to > begin else (to, high)
     if not low <= begin <= high:
         raise ValueError(f"within: found {name} = {begin:g} of the first solution outside; expected it inside")
     outside = next((value for value in ends if not low <= value <= high), None)

@@ -31,7 +31,7 @@ from itertools import chain
 
 import numpy as np
 
-from synchain.models.inputs.checks import check_keys, check_number, check_table, listed
+from synchain.models.inputs.checks import check_keys, check_positive, check_table, listed
 
 from .arclength import FIRST_STEP, LARGEST_STEP, MOST, Limits, Point, correct, walk
 from .critical_curve import CriticalCurve
@@ -132,7 +132,7 @@ def follow_curve(
     largest = LARGEST_STEP
     if largest_step is not None:
         unit = sizes[1] if np.isfinite(sizes[1]) else abs(scene.parameters[names[1]]) or 1.0
-        largest = check_number("largest_step", largest_step, 0.0) / unit
+        largest = check_positive("largest_step", largest_step) / unit
     limits = Limits(bounds, MOST, min(FIRST_STEP, largest), largest)
     parts = [_part(first, names, np.array(sizes), sign, limits) for sign in signs]
     points, special, end = parts[-1]

@@ -21,7 +21,7 @@ POWERS = [1.0, -0.6, 0.4, -1.1, 0.3]
 
 
 def brusselators(n: int = 6, B: float = 2.0) -> sc.Scene:
-    node = sc.Field({"x": "2 - (B + 1)*x + x**2*y", "y": "B*x - x**2*y"}, parameters={"B": B})
+    node = sc.Field({"x": "2 - (B + 1)*x + x**2*y", "y": "B*x - x**2*y"}, parameters={"B": sc.Parameter(B, minimum=0)})
     link = sc.Rates({"x": "Dx*W*(x_j - x_i)", "y": "Dy*W*(y_j - y_i)"}, {"Dx": 0.1, "Dy": 1})
     return sc.Scene(node, link, sc.graphs.ring(n), initial={"x": 2, "y": B / 2})
 
@@ -253,6 +253,10 @@ def test_branches_open_as_they_were_saved(tmp_path: Path) -> None:
         ("B", {"to": 2}, "the value of the first solution; expected another value"),
         ("B", {"within": (3, 4)}, "found B = 2 of the first solution outside"),
         ("B", {"within": (4, 3)}, "expected two numbers, the lower one first"),
+        ("B", {"to": 5, "within": (1, 3)}, "to: found 5, outside of within=.1, 3.; expected a value inside"),
+        ("B", {"to": -1}, "B = -1.0 is not allowed"),
+        ("B", {"to": 3, "largest_step": 0}, "largest_step: found 0; expected a number above 0"),
+        ("B", {"to": 3, "vector": 1}, "vector: found 1; expected 0 for a branch that leaves no bifurcation"),
         ("B", {"to": 3, "direction": "left"}, "direction: found 'left'; expected 'both', 'up' or 'down'"),
     ],
 )
