@@ -140,7 +140,7 @@ class LiftedFlow:
             return terms if mass is None else np.abs(spsolve(mass, terms))
 
         return Walker(self, values, state), RateFunctions(
-            lambda x: self.rates(values, x[None])[0], sizes, periods_of_states(self.equations)
+            lambda x: self.rates(values, x[None])[0], sizes, periods_of_states(self.equations), self.equations.sticks
         )
 
     def advance(self, values: Mapping[str, float], states: np.ndarray, times: np.ndarray) -> np.ndarray:

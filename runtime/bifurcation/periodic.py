@@ -332,7 +332,7 @@ def _cycle(scene: Scene, classes: tuple[int, ...], flow: Flow, state: np.ndarray
     """Follow an undriven motion to its attracting cycle."""
     values, size = scene.parameters, flow.size
     walker, rates = flow.motion(values, state)
-    turns = turns_of(walker, rates, drifts=not flow.equations.sticks)
+    turns = turns_of(walker, rates)
     walker, left = flow.motion(values, state)[0], max(round(scene.transient), 0)
     while left > 0:
         some = min(left, TOGETHER)

@@ -108,6 +108,7 @@ class RateFunctions(NamedTuple):
     values: Callable[[np.ndarray], np.ndarray]
     sizes: Callable[[np.ndarray], np.ndarray]
     periods: tuple[float | None, ...] = ()  # the period of each state that is an angle, None for the others
+    jump: bool = False  # True if events, such as the end of stick, change the rates
 
     def difference(self, state: np.ndarray, start: np.ndarray) -> np.ndarray:
         """Return the difference (p,) of two states without whole turns of angles."""
@@ -194,10 +195,10 @@ def rates_of(equations: Equations, parameters: dict[str, float]) -> RateFunction
     """Return the rates of equations as functions of the state alone; with a mass matrix M, of M^-1 times the forces."""
     names = [sp.Symbol(name, real=True) for name in (*equations.state, *equations.parameters)]
     values = np.array([parameters[name] for name in equations.parameters], dtype=float)
-    rates, sizes = (_summed(equations, names, values, change) for change in (lambda e: e, _size))
+    rates, sizes = (_summed(equations, names, values, change) for change in (lambda e, _: e, _size))
     mass, angles = equations.mass(), periods_of_states(equations)
     if not mass:
-        return RateFunctions(rates, sizes, angles)
+        return RateFunctions(rates, sizes, angles, equations.sticks)
     masses, places = sp.lambdify(names, [*mass.values()], "numpy"), tuple(np.array([*mass]).T)
 
     def inverse(state: np.ndarray) -> np.ndarray:
@@ -206,14 +207,22 @@ def rates_of(equations: Equations, parameters: dict[str, float]) -> RateFunction
         return np.linalg.inv(matrix)
 
     return RateFunctions(
-        lambda state: inverse(state) @ rates(state), lambda state: np.abs(inverse(state)) @ sizes(state), angles
+        lambda state: inverse(state) @ rates(state),
+        lambda state: np.abs(inverse(state)) @ sizes(state),
+        angles,
+        equations.sticks,
     )
 
 
 def _summed(
-    equations: Equations, names: list[sp.Symbol], values: np.ndarray, change: Callable[[sp.Expr], sp.Expr]
+    equations: Equations,
+    names: list[sp.Symbol],
+    values: np.ndarray,
+    change: Callable[[sp.Expr, set[sp.Symbol]], sp.Expr],
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """Return the sum of nodes and links at time 0 as a function of the state; `change` changes their expressions.
+    """Return the sum of nodes and links at time 0 as a function of the state.
+
+    `change` changes their expressions, which contain the given modes of events.
 
     Each template is compiled once, and evaluated for all its nodes or links together.
     """
@@ -224,9 +233,11 @@ def _summed(
         uses.setdefault(equations.node_at(i), []).append((places, equations.at_node(i)))
     for link, edge in equations.linked():
         uses.setdefault(edge, []).append((equations.places[link[0]], equations.at_link(link, edge)))
-    parts = []
+    parts, nodes = [], range(equations.n)
+    all_modes = {s for i in nodes for s in equations.symbols(i)[len(equations.node_at(i).continuous) :]}
     for template, each in uses.items():
-        rates = [change(e).xreplace({TIME: sp.S.Zero}) for e in template.rhs]
+        modes = {s for s, at in each[0][1].items() if at in all_modes}
+        rates = [change(e, modes).xreplace({TIME: sp.S.Zero}) for e in template.rhs]
         symbols = sorted({s for e in rates for s in e.free_symbols}, key=lambda s: s.name)
         chosen = [[columns.setdefault(at.get(s, s), len(columns)) for _, at in each] for s in symbols]
         arguments = [np.array(row) if len(row) > 1 else row[0] for row in chosen]
@@ -243,14 +254,15 @@ def _summed(
     return total
 
 
-def _size(e: sp.Expr) -> sp.Expr:
+def _size(e: sp.Expr, modes: set[sp.Symbol]) -> sp.Expr:
     """Return the sum of absolute values of terms, also in products; waves of time count with their amplitude."""
     if isinstance(e, sp.sin | sp.cos) and e.has(TIME):
         return sp.S.One
-    if isinstance(e, sp.Add | sp.Mul):
-        return e.func(*map(_size, e.args))
+    # modes are whole numbers: 1 - slip**2 has no rounding error
+    if isinstance(e, sp.Add | sp.Mul) and not e.free_symbols <= modes:
+        return e.func(*(_size(part, modes) for part in e.args))
     if isinstance(e, sp.Pow) and e.exp.is_integer and e.exp.is_positive:
-        return _size(e.base) ** e.exp
+        return _size(e.base, modes) ** e.exp
     return sp.Abs(e)
 
 
@@ -346,13 +358,13 @@ def _fastest(rates: RateFunctions, state: np.ndarray) -> float:
     return float(np.abs(np.linalg.eigvals(slopes)).max()) if np.isfinite(slopes).all() else 0.0
 
 
-def turns_of(integrator: OrbitIntegrator, rates: RateFunctions, hidden: int = 0, drifts: bool = True) -> Turns:
+def turns_of(integrator: OrbitIntegrator, rates: RateFunctions, hidden: int = 0) -> Turns:
     """Measure the mean return time of an undriven orbit, or the slowest rate of the equilibrium that the orbit reaches.
 
     The turns of a fast approach, such as those of Lorenz's system from x = 1e6, are not the unit of time: measure again
     until no component moves one way, and volumes have shrunk while the time of a turn did not change.
     """
-    turns, path_states, time = _turns_of_path(integrator, rates, hidden, drifts)
+    turns, path_states, time = _turns_of_path(integrator, rates, hidden)
     trend, before, length, begun, last = _trend(path_states), path_states[-1], 0.0, integrator.steps, turns
     shrinks = _contraction(rates, path_states, turns.extent)
     shrunk = shrinks * time
@@ -369,7 +381,7 @@ def turns_of(integrator: OrbitIntegrator, rates: RateFunctions, hidden: int = 0,
             integrator.advance(length)
         except FloatingPointError:  # the transient raises the error for an unbounded motion
             break
-        later, path_states, time = _turns_of_path(integrator, rates, hidden, drifts)
+        later, path_states, time = _turns_of_path(integrator, rates, hidden)
         shrinks = _contraction(rates, path_states, later.extent)
         same = last.time / STEADY < later.time < STEADY * last.time
         shrunk, last = shrunk + shrinks * (length + time) if same else 0.0, later
@@ -397,14 +409,13 @@ def _trend(states: np.ndarray) -> np.ndarray:
 
 
 def _turns_of_path(
-    integrator: OrbitIntegrator, rates: RateFunctions, hidden: int, drifts: bool
+    integrator: OrbitIntegrator, rates: RateFunctions, hidden: int
 ) -> tuple[Turns, np.ndarray, float]:
     """Return unit and extent of a path, its later states (k, p) if it turns, else its last one, and its length of time.
 
     A motion with constant rates, such as that of locked phases, counts as an equilibrium that drifts. A turn of a
     component lasts from one maximum to the next; between them the component falls and rises by at least CLEAR times its
     extent. The component with the most turns gives the time. Only the later three quarters of a path are searched.
-    Without `drifts` constant rates count as motion, such as that of a body in stick on a moving ground.
     """
     count = integrator.state.shape[1] - hidden
     start = integrator.state[0, :count].copy()
@@ -429,13 +440,13 @@ def _turns_of_path(
                     break
                 if k % LOOKED == 0 and _mean_turn(np.array(times[k // 4 :]), np.array(states[k // 4 :]), noise, ENOUGH):
                     break
-                if drifts and k % OFTEN == 0 and _drift(rates, times, states, velocities, extent, closed) is not None:
+                if k % OFTEN == 0 and _drift(rates, times, states, velocities, extent, closed) is not None:
                     break
         except FloatingPointError:  # the transient raises the error for an unbounded motion
             pass
     # subtract an even drift, such as that of locked phases: only the approach to the drift counts as motion
     at_rest = rests(rates, states[-1], REST, extent, noise)
-    drift = _drift(rates, times, states, velocities, extent, closed) if drifts else None
+    drift = _drift(rates, times, states, velocities, extent, closed)
     even = np.zeros_like(start) if at_rest else drift
     early, path_states = len(times) // 4, np.array(states)
     if even is not None:
@@ -459,7 +470,8 @@ def _drift(
     closed: float,
 ) -> np.ndarray | None:
     """Return the rates (p,) if they have not changed in the later half of the time, else None."""
-    if len(states) <= LOOKED:
+    # a body in stick on a moving ground has constant rates until it slips
+    if rates.jump or len(states) <= LOOKED:
         return None
     first = bisect_left(times, 0.5 * times[-1])
     # the slow part of a relaxation oscillation resembles a drift: wait until the motion has gone far at one speed
