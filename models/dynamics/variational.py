@@ -73,6 +73,11 @@ class Variation:
             if any(slope.free_symbols & strengths for slope in slopes):
                 raise ValueError(f"variation: entry ({row}, {column}) is not linear in the strengths of a mode: {e}")
 
+    def in_units(self, units: Sequence[sp.Expr]) -> Variation:
+        """Return the system for deviations in these units of their components."""
+        matrix = tuple(((r, c), e * units[c] / units[r]) for (r, c), e in self.matrix)
+        return replace(self, matrix=matrix, events=self.events and self.events.in_units(units))
+
     def parts(self, e: sp.Expr) -> list[tuple[sp.Expr, sp.Expr]]:
         """Return the non-zero terms of an entry of A as pairs of a coefficient and its factor, a strength or 1."""
         used = [s for s in self.parameters if s in e.free_symbols]

@@ -118,8 +118,7 @@ class TangentFrame:
 
         # in units of the extent of the motion, all components of a deviation have similar sizes
         turns = begun(problem)._measured(lambda: rates_of(network.orbit, dict(scene.parameters)))
-        if not sticks:
-            problem = replace(problem, variation=_scaled(variation, turns.extent))
+        problem = replace(problem, variation=_scaled(variation, turns.extent))
         return begun(problem.with_turns(turns, start))
 
     @classmethod
@@ -209,5 +208,4 @@ def _scaled(variation: Variation, extent: np.ndarray) -> Variation:
         return variation
     logarithms = np.log(np.where(moving, extent[: variation.size], 1.0)) / math.log(UNIT)
     powers = np.where(moving, np.round(logarithms - np.median(logarithms[moving])), 0.0).astype(int)
-    matrix = tuple(((r, c), e * sp.Integer(UNIT) ** int(powers[c] - powers[r])) for (r, c), e in variation.matrix)
-    return Variation(variation.orbit, variation.size, matrix)
+    return variation.in_units([sp.Integer(UNIT) ** int(power) for power in powers])
