@@ -51,7 +51,9 @@ class Events:
 
     def in_units(self, units: Sequence[sp.Expr]) -> Events:
         """Return the events of deviations in these units of their components."""
-        both = ((tuple(((r, c), e * units[c] / units[r]) for (r, c), e in side) for side in pair) for pair in self.exits)
+        both = (
+            (tuple(((r, c), e * units[c] / units[r]) for (r, c), e in side) for side in pair) for pair in self.exits
+        )
         inside = {d: unit * d for d, unit in zip(self.deviations, units, strict=False)}
         jumps = (tuple(e.xreplace(inside) / unit for e, unit in zip(jump, units, strict=True)) for jump in self.jumps)
         return replace(self, exits=tuple((up, down) for up, down in both), jumps=tuple(jumps))

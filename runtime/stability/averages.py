@@ -39,6 +39,8 @@ PRECISION = 1e-3
 """Default standard error of an average, times the unit of time of the motion over 2 pi (a choice)."""
 TRANSIENT = 300.0
 """Periods before an average unless a call or the scene says otherwise (a choice)."""
+UNCLEAR = 3.0
+"""A mean rate below UNCLEAR over the time of growth may belong to growth by a power of time (a choice)."""
 TOLERANCE_RATIO, TRIED = 4.0, 8
 """The error of the steps is estimated by repeating TRIED blocks at TOLERANCE_RATIO times the tolerance (a choice)."""
 
@@ -200,6 +202,15 @@ def error_of_steps(
     return np.asarray(np.sqrt(change.mean(axis=0) ** 2 + change.var(axis=0) / len(change)) / length)
 
 
+def with_growth_by_powers(mean: np.ndarray, error: np.ndarray, time: float) -> np.ndarray:
+    """Return the errors of mean growth rates of deviations that have grown over a time, with that of an exponent 0.
+
+    A neutral deviation grows by a power t**k, or by a bounded factor, so that its mean rate is k/time or less. A mean
+    of this size is no certain exponent: its error is at least its size.
+    """
+    return np.where(np.abs(mean) * time < UNCLEAR, np.maximum(error, np.abs(mean)), error)
+
+
 @dataclass(slots=True)
 class Batches:
     """Compute means of growth rates over batches of blocks, and their standard errors.
@@ -213,6 +224,10 @@ class Batches:
     frequencies may be too small by chance; Student's quantile corrects for this chance, so that the mean lies within
     two errors of the truth in 95 of 100 runs, as often as a normal variable. An error from fewer than FEWEST
     frequencies is infinite.
+
+    A sum that stays bounded, such as the growth along two incommensurate frequencies, has no density at frequency 0.
+    Its mean still depends on where the run begins and ends: the error is at least the scatter of a batch over T. Of
+    chaotic growth, the scatter over T is 1/sqrt(n) of the error, of n batches.
 
     References
     ----------
@@ -313,7 +328,8 @@ class Batches:
         waves = _waves(frequencies, complete) @ sums.reshape(complete, -1)
         spread = np.sqrt(np.einsum("ij,ij->j", waves, waves) / (freedom * complete)).reshape(sums.shape[1:])
         # equal terms have no scatter, but their sum has a rounding error
-        error = np.maximum(_wide(freedom) * spread, ROUNDING * np.abs(sums).mean(axis=0))
+        least = np.maximum(sums.std(axis=0) / complete, ROUNDING * np.abs(sums).mean(axis=0))
+        error = np.maximum(_wide(freedom) * spread, least)
         error /= self.per_batch * self.block * self.unit
         return np.asarray(error if self.planned is None else np.maximum(error, self.planned / math.sqrt(self.blocks)))
 

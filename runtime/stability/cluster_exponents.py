@@ -29,7 +29,7 @@ from ..results.labelled import Labelled, as_json, dataset
 from ..support.error_text import with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
-from .averages import Averaging, Batches, document_keywords
+from .averages import Averaging, Batches, document_keywords, with_growth_by_powers
 from .orbits import OrbitProblem
 from .variational_integrator import VariationalIntegrator
 
@@ -59,7 +59,8 @@ class ClusterExponents(Labelled):
     exponent : ndarray, shape (blocks,)
         Largest exponent of each block per unit of non-dimensional time.
     stderr : ndarray, shape (blocks,)
-        Standard errors of `exponent`.
+        Standard errors of `exponent`. An exponent within 3 over the time since the start is not told from 0, as
+        deviations may grow by a power of time: its error is at least its size.
     motion : float
         Largest exponent of the clusters' own motion.
     motion_error : float
@@ -282,6 +283,7 @@ def cluster_exponents(
             f"the exponents may be those of fewer clusters; raise transient = {averaging.transient:g}"
         )
     mean, error, time = batches.mean()[0], np.hypot(batches.error_by_start(), steps)[0], batches.time
+    error = with_growth_by_powers(mean, error, dropped * problem.unit + time)
     return ClusterExponents(
         partition, mean[1:], error[1:], float(mean[0]), float(error[0]), apart, time, approaching, str(problem.turns)
     )

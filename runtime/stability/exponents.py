@@ -34,7 +34,7 @@ from ..support.error_text import interval_text, range_text, with_error
 from ..support.execution import Execution
 from ..support.progress import Hook, Reporter
 from .attractor import Attractor, Motion, find_attractor
-from .averages import Averaging, Batches, document_keywords
+from .averages import Averaging, Batches, document_keywords, with_growth_by_powers
 from .march import March, interpolation_for
 from .motion import starts_near
 from .orbits import OrbitProblem, pair_of
@@ -565,4 +565,5 @@ def average(march: March, averaging: Averaging, reporter: Reporter) -> tuple[np.
             parts = batches.ahead(left)
             growths = march.growths(parts)
         batches.extend(growths, parts)
-    return batches.mean(), np.hypot(batches.error_by_start(), steps), batches.time
+    mean, time = batches.mean(), batches.time
+    return mean, with_growth_by_powers(mean, np.hypot(batches.error_by_start(), steps), time), time

@@ -34,7 +34,7 @@ from ..results.labelled import Labelled, dataset
 from ..support.error_text import with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
-from .averages import Averaging, Batches, document_keywords
+from .averages import Averaging, Batches, document_keywords, with_growth_by_powers
 from .slow_motion import warn_of_slow_motion
 from .tangent_frame import TangentFrame
 
@@ -50,7 +50,8 @@ class Lyapunov(Labelled):
     """Lyapunov exponents of a network.
 
     Exponents that differ by less than about 1/time are not separated: only their sum is right. The
-    standard errors do not include this effect.
+    standard errors do not include this effect. An exponent within 3 over the time since the start is not told from
+    0, as deviations may grow by a power of time: its error is at least its size.
 
     Parameters
     ----------
@@ -208,7 +209,7 @@ def lyapunov_spectrum(
     Raises
     ------
     ValueError
-        If there are more than eight oscillators with set-valued friction, if `count` exceeds the number of
+        If there are more than 32 oscillators with set-valued friction, if `count` exceeds the number of
         exponents, if `rtol` is too large, or if time enters the equations without a known period.
     FloatingPointError
         If the integration fails.
@@ -261,8 +262,9 @@ def lyapunov_spectrum(
             batches.extend(growths[:, None], parts)
         steps = frame.error_of_steps()
     orbit = frame.integrator
-    result = _report(frame, batches, lost, steps)
-    contraction, whole = -result.divergence / frame.size, averaging.transient * frame.unit + batches.time
+    whole = averaging.transient * frame.unit + batches.time
+    result = _report(frame, batches, lost, steps, whole)
+    contraction = -result.divergence / frame.size
     warn_of_slow_motion(
         equations, orbit.state[:, : equations.dimension], _values(scene), batches.time, contraction, whole
     )
@@ -273,12 +275,16 @@ def _values(scene: Scene) -> np.ndarray:
     return np.array([scene.parameters[name] for name in scene.equations.parameters])
 
 
-def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray, steps: np.ndarray) -> Lyapunov:
-    """Return the result of an average; all exponents after a lost direction count as lost too."""
+def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray, steps: np.ndarray, whole: float) -> Lyapunov:
+    """Return the result of an average of directions that have grown over the `whole` time.
+
+    All exponents after a lost direction count as lost too.
+    """
     resolved = ~np.logical_or.accumulate(lost)
     mean, error = batches.mean()[0], np.hypot(batches.error_by_start()[0], steps)
     unknown = 0.0 if frame.orbit.sticks else np.nan
-    exponent, spread = np.where(resolved, mean[:-1], -np.inf), np.where(resolved, error[:-1], unknown)
+    spread = np.where(resolved, with_growth_by_powers(mean[:-1], error[:-1], whole), unknown)
+    exponent = np.where(resolved, mean[:-1], -np.inf)
     order = np.argsort(-exponent, kind="stable")
     lengths, running = batches.running()
     time, volume = batches.time, (float(mean[-1]), float(error[-1]))

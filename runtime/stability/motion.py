@@ -220,9 +220,7 @@ def _summed(
     values: np.ndarray,
     change: Callable[[sp.Expr, set[sp.Symbol]], sp.Expr],
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """Return the sum of nodes and links at time 0 as a function of the state.
-
-    `change` changes their expressions, which contain the given modes of events.
+    """Return the sum of nodes and links at time 0 as a function of the state; `change` has expressions and modes of events.
 
     Each template is compiled once, and evaluated for all its nodes or links together.
     """
@@ -408,9 +406,7 @@ def _trend(states: np.ndarray) -> np.ndarray:
     return np.where(np.all(steps == steps[:1], axis=0), steps[0], 0.0) if len(steps) else np.zeros(states.shape[1])
 
 
-def _turns_of_path(
-    integrator: OrbitIntegrator, rates: RateFunctions, hidden: int
-) -> tuple[Turns, np.ndarray, float]:
+def _turns_of_path(integrator: OrbitIntegrator, rates: RateFunctions, hidden: int) -> tuple[Turns, np.ndarray, float]:
     """Return unit and extent of a path, its later states (k, p) if it turns, else its last one, and its length of time.
 
     A motion with constant rates, such as that of locked phases, counts as an equilibrium that drifts. A turn of a

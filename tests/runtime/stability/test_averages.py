@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from synchain import Scene, cluster_exponents, exponents, lyapunov_spectrum, thresholds
+from synchain import Field, Scene, cluster_exponents, exponents, lyapunov_spectrum, thresholds
 from synchain.graphs import chain
 from synchain.runtime.stability.averages import FEWEST, FIRST, MOST, Averaging, Batches
 from synchain.runtime.stability.exponents import average, initial_states
@@ -70,6 +70,37 @@ def test_the_error_follows_from_what_remains_of_the_noise_after_long_times():
     scatter = math.sqrt(2.0 / 2048)
     assert np.median(batches.error_by_start()) < 0.15 * scatter
     assert batches.frequencies == MOST
+
+
+def test_a_sum_that_stays_bounded_has_the_error_of_its_ends():
+    """Differences of cosines at incommensurate frequencies: their sum over any time is that of both ends."""
+    random, batches = np.random.default_rng(0), Batches(1.0)
+    frequency, phase = random.uniform(0.02, 0.5, 4000), random.uniform(0.0, 1.0, 4000)
+    last = np.cos(2.0 * np.pi * phase)
+    for k in range(1, 1500):
+        now = np.cos(2.0 * np.pi * (phase + frequency * k))
+        batches.add((now - last)[:, None])
+        last = now
+    assert np.mean(np.abs(batches.mean()) > 2.0 * batches.error_by_start()) < 0.06
+
+
+NEUTRAL = {
+    "cycle": Scene(Field({"x": "v", "v": "(1 - x**2)*v - x"}, initial={"x": 2.0}), "x->v", chain(2), transient=20),
+    "pendulum": Scene(Field({"x": "v", "v": "-sin(x)"}, initial={"x": 1.0}), "x->v", chain(2)),
+}
+"""Uncoupled nodes: deviations along a limit cycle stay bounded, those of a pendulum grow with time."""
+
+
+@pytest.mark.parametrize("motion", NEUTRAL)
+def test_neutral_directions_are_undecided(motion):
+    scene = NEUTRAL[motion]
+    clusters = cluster_exponents(scene, (0, 0), periods=128, show_progress=False)
+    assert clusters.verdicts == ("undecided within the error",)
+    spectrum = lyapunov_spectrum(scene.lone, periods=128, show_progress=False)
+    zero = slice(0, 1 if motion == "cycle" else 2)
+    assert np.all(np.abs(spectrum.exponent[zero]) < 1e-3)
+    assert np.all(np.abs(spectrum.exponent[zero]) <= spectrum.stderr[zero])
+    assert motion == "pendulum" or spectrum.stderr[1] < 1e-4
 
 
 def test_an_average_of_few_periods_has_no_error():

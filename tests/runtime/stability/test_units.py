@@ -6,8 +6,20 @@ import warnings
 
 import numpy as np
 import pytest
+import sympy as sp
 
-from synchain import Field, Scene, cluster_exponents, exponents, lyapunov_spectrum, msf, plane
+from synchain import (
+    Field,
+    Friction,
+    Lagrangian,
+    Scene,
+    cluster_exponents,
+    exponents,
+    friction_law,
+    lyapunov_spectrum,
+    msf,
+    plane,
+)
 from synchain.graphs import chain
 from synchain.results import MSF, Exponents
 from synchain.runtime.stability.attractor import Attractor, Motion
@@ -61,6 +73,71 @@ def test_the_function_of_a_cycle_is_stable_above_zero(s: float, k: float) -> Non
     assert (abs(low) < 1e-5 * k, high) == (True, k)
     table = plane(pair(s, k=k), k * np.array([0.3, 1.0]), k * np.array([0.0, 0.5]), starts=1)
     np.testing.assert_allclose(table.exponent[:, 0] / k, KNOWN[1:], atol=2e-6)
+
+
+X, V, Y, U, TIME = sp.symbols("x v y u t")
+
+
+def rubbing(s: float, t: float) -> Scene:
+    """Two driven masses on rough ground, which turn without stick, in units s of length and t of time."""
+    force = s / t**2
+    laws = [friction_law(f"mu{k}*sign(w)", {f"mu{k}": mu}) for k, mu in enumerate((0.3, 0.2))]
+    masses = Lagrangian(
+        V**2 / 2 + U**2,
+        (X**2 / 2 + Y**2 / 2 + (X - Y) ** 2 / 4) / t**2,
+        {X: force * sp.cos(0.7 * TIME / t), Y: 0.5 * force * sp.sin(0.7 * TIME / t)},
+        coordinates={X: V, Y: U},
+        events=[Friction(-v, load=force, law=law) for v, law in zip((V, U), laws, strict=True)],
+        contact="set-valued",
+        initial={X: 0.5 * s, V: 0.0, Y: -0.2 * s, U: 0.1 * s / t},
+    )
+    return Scene(masses, None, transient=50)
+
+
+@pytest.mark.parametrize(("s", "t"), [(1.0, 1e-6), (1e-6, 1e6), (1e6, 1e-3)])
+def test_spectra_with_dry_friction_in_any_unit(s: float, t: float) -> None:
+    """Moduli 0.78187 and 0.4987 of the multipliers by `periodic_orbit`, each of a pair of complex ones."""
+    result = lyapunov_spectrum(rubbing(s, t), periods=200)
+    known = np.repeat(np.log([0.78187, 0.4987]), 2) * 0.7 / (2.0 * np.pi)
+    assert np.all(result.stderr > 0.0)
+    np.testing.assert_allclose(result.exponent * t, known, atol=3e-3)
+    assert result.exponent.sum() * t == pytest.approx(known.sum(), abs=1e-4)
+
+
+def belted(s: float, t: float, n: int) -> Scene:
+    """Blocks on a belt under falling friction, joined by springs, in units s of length and t of time."""
+    force = s / t**2
+    law = friction_law("mu*sign(w)/(1 + abs(w)*fall)", {"mu": 0.5, "fall": 3.0 * t / s})
+    block = Lagrangian(
+        V**2 / 2,
+        X**2 / 2 / t**2,
+        {X: -0.02 * V / t},
+        coordinates={X: V},
+        events=[Friction(0.2 * s / t - V, load=force, law=law)],
+        contact="set-valued",
+        initial={X: 0.1 * s, V: 0.0},
+    )
+    if n == 1:
+        return Scene(block, None, transient=30 * t)
+    start = {"x": [0.1 * s, 0.13 * s], "v": 0.0}
+    return Scene(block, "spring", chain(n), transient=100 * t, initial=start, parameters={"sigma": 0.1 / t**2})
+
+
+@pytest.mark.parametrize(("s", "t"), [(1e6, 1.0), (1.0, 1e-6)])
+def test_spectra_of_stick_slip_in_any_unit(s: float, t: float) -> None:
+    """The blocks turn together: exponents 0 along the cycle, -0.0964 and -0.438 of their difference."""
+    result = lyapunov_spectrum(belted(s, t, 2), periods=100)
+    np.testing.assert_allclose(result.exponent[:3] * t, [0.0, -0.0964, -0.4380], atol=3e-3)
+    assert result.exponent[3] == -np.inf
+    assert float(result.unit.split(",")[1].split()[0]) == pytest.approx(7.387 * t, rel=1e-3)
+
+
+def test_the_turn_of_a_block_on_a_belt_in_fast_units() -> None:
+    """The period of the cycle by `periodic_orbit`."""
+    result = lyapunov_spectrum(belted(1.0, 1e-6, 1), periods=60)
+    assert result.unit == "mean return time, 8.30186e-06 units of time"
+    assert abs(result.exponent[0]) * 1e-6 < 1e-3
+    assert result.exponent[1] == -np.inf
 
 
 @pytest.mark.parametrize("s", [1e-7, 1.0])
