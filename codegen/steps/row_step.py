@@ -43,10 +43,10 @@ LEVEL, GAP, MODE, SPEED, RATE, RATIO = range(6)  # the groups of numbers in fron
 
 def most_rows(equations: Equations) -> int:
     """Return the largest number of rows of a node, or of a part that links join."""
-    return max(len(rows) for rows in _all_rows(equations))
+    return max(len(rows) for rows in all_rows(equations))
 
 
-def _all_rows(equations: Equations) -> list[tuple[Row, ...]]:
+def all_rows(equations: Equations) -> list[tuple[Row, ...]]:
     """Return the rows of each node, or of each part that links join."""
     if equations.joined:
         return [part.template.rows for part in equations.parts] or [()]
@@ -65,7 +65,7 @@ def row_count(equations: Equations) -> int:
     """Return the number of contacts, or of rows of all nodes and links."""
     if not equations.has_rows:
         return equations.n * equations.sticks
-    return sum(map(len, _all_rows(equations)))
+    return sum(map(len, all_rows(equations)))
 
 
 def row_functions(equations: Equations, names: Names, looped: bool) -> list[Function]:

@@ -166,7 +166,13 @@ class UnrolledStep(StepWriter):
         for key, e in eq.link_jacobian():
             if node[key[0]] == node[key[1]] or not self.method.inexact:
                 entries[key] = entries.get(key, sp.S.Zero) + e
-        return {key: e for key, e in entries.items() if e != 0}
+        entries = {key: e for key, e in entries.items() if e != 0}
+        if not eq.parts:
+            return entries
+        # The unknowns of rows in links are nested in every entry, which written out would fill the memory.
+        body = share(list(entries.values()), self.supply)
+        self.put(*assigned(body))
+        return dict(zip(entries, body.results, strict=True))
 
     # -- stages -----------------------------------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.rows import Law
 
 from ..program.expressions import Compare, Conditional, Name, Number, call
 from ..program.passes import real
@@ -32,6 +33,7 @@ from ..program.statements import (
     operations,
 )
 from ..program.statements import called as called_functions
+from ..steps.row_step import all_rows
 from .event_location import FUNCTIONS
 from .series import Time
 from .series_graph import LANE_FUNCTIONS
@@ -50,8 +52,17 @@ COUNTED = re.compile(r"[rs]\d+$")
 
 ARGUMENTS = ("t", "h", "scale", "y", "p", "y_new", "dense", "rtol", "atol")
 
-SOONEST = let("nearest", 1e-13 * call("maximum", "t", "scale") / "scale")
-"""Least step to a contact or a jump: about 450 rounding errors of the time, so that time advances; a choice."""
+
+def soonest(equations: Equations) -> Statement:
+    """Return the least step to an event: about 450 rounding errors of the time, so that time advances.
+
+    Impacts may follow each other in any unit of time.  Contacts need a step in which a sliding velocity changes by more
+    than rounding; as such a step serves a unit of time (a choice).
+    """
+    stops = any(row.law is Law.STOP for rows in all_rows(equations) for row in rows)
+    least = Name("scale") if stops else Number(1.0)
+    return let("nearest", 1e-13 * call("maximum", "t", least) / "scale")
+
 
 LEAST_ORDER = 6
 """The least order: its last three orders, which determine the step length, lie above the orders `step_length.LOW`."""
@@ -124,7 +135,7 @@ class TaylorStepWriter(ABC):
         passages = [s for part in self.parts for s in part.passages(self.exact)]
         if passages:
             begin: list[Statement] = [Comment("first passage"), let("passed", "ratio")]
-            begin += [SOONEST] if "nearest" in mentioned(passages) else []
+            begin += [soonest(self.equations)] if "nearest" in mentioned(passages) else []
             passed = Compare("<", Name("passed"), Name("ratio"))
             until = Conditional(passed, Name("passed") * "scale", Name("length"))
             passages = [*begin, *passages, let("until", until), let("ratio", "passed")]
