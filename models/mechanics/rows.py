@@ -151,7 +151,9 @@ class Row:
 @lru_cache(maxsize=4096)
 def term_size(e: sp.Expr) -> sp.Expr:
     """Return an expression with the modulus of each term in place of the term."""
-    return e.func(*map(term_size, e.args)) if isinstance(e, sp.Add | sp.Mul) else abs(e)
+    if isinstance(e, sp.Add | sp.Mul):
+        return e.func(*map(term_size, e.args))
+    return abs(e) if e.is_Atom else sp.Abs(e, evaluate=False)  # SymPy takes minutes over moduli of long quotients
 
 
 def with_rows(
