@@ -153,7 +153,8 @@ def term_size(e: sp.Expr) -> sp.Expr:
     """Return an expression with the modulus of each term in place of the term."""
     if isinstance(e, sp.Add | sp.Mul):
         return e.func(*map(term_size, e.args))
-    return abs(e) if e.is_Atom else sp.Abs(e, evaluate=False)  # SymPy takes minutes over moduli of long quotients
+    # SymPy takes minutes over moduli of long quotients.
+    return abs(e) if e.is_Atom or e.is_number else sp.Abs(e, evaluate=False)
 
 
 def with_rows(
