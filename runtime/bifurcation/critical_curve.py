@@ -158,8 +158,12 @@ class CriticalCurve(ABC):
         """Return the test functions of points of codimension two."""
 
     def limits(self) -> Mapping[str, Test]:
-        """Return functions that are positive on the curve; it ends where one is zero."""
+        """Return functions that are positive on the curve; it ends where one is zero, at a point that `origin` names for ""."""
         return {}
+
+    def origin(self, z: np.ndarray) -> str:
+        """Name the point at which cycles shrink onto an equilibrium."""
+        return ""
 
     @abstractmethod
     def passing(self, value: complex) -> str:

@@ -18,6 +18,7 @@ Here u and v are the left and right null vectors.
 | cusp | on folds u K_y w w |
 | 1:1, 1:2 resonance | a second multiplier passes 1, -1 on folds, period doublings; torus points end there |
 | 1:3, 1:4 resonance | on torus points the cosine of the angle passes -1/2, 0 |
+| Bautin, zero-Hopf, double Hopf | the cycle shrinks onto an equilibrium: the curve ends |
 | "fold with torus" … | a multiplier of another kind passes |
 
 Source: Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed. (Springer, 2004), chapters 8 to 10.
@@ -36,7 +37,7 @@ from synchain.models.inputs.checks import check_keys, check_positive, check_tabl
 from .arclength import FIRST_STEP, LARGEST_STEP, MOST, Limits, Point, correct, walk
 from .critical_curve import CriticalCurve
 from .cycle_curves import CycleCurve
-from .detection import REAL, TOGETHER, BranchStep
+from .detection import REAL, TOGETHER, BranchStep, growth_of
 from .equilibrium import Equilibrium
 from .equilibrium_curves import EquilibriumCurve
 from .kinds import BifurcationKind
@@ -56,17 +57,21 @@ def codimension_two(
         return None
 
 
-def _points(problem: CriticalCurve, step: BranchStep) -> Iterator[tuple[float, CurvePoint]]:
-    """Yield the points of codimension two, and those at which a parameter is extreme, in any order."""
+def _points(problem: CriticalCurve, step: BranchStep) -> Iterator[tuple[float, CurvePoint | str]]:
+    """Yield points of codimension two, those at which a parameter is extreme, and how the curve ends, in any order."""
 
-    def point(kind: str, distance: float) -> tuple[float, CurvePoint]:
-        z = step.at(distance).z
+    def point(kind: str, distance: float, z: np.ndarray | None = None) -> tuple[float, CurvePoint]:
+        z = step.at(distance).z if z is None else z
         return distance, CurvePoint(kind, (float(z[-2]), float(z[-1])), problem.state(z), problem.frequency(z))
 
     ends = step.before, step.after
     for name, test in problem.limits().items():
         if test(ends[1]) <= 0.0:
-            yield point(name, step.zero(test))
+            distance = step.zero(test)
+            z = (step.at(distance) if name else step.singular_point(distance, test)).z
+            _, end = point(name or problem.origin(z), distance, z)
+            yield distance, end
+            yield distance, f"{end.kind} at {digits_of(end.values)}"
             return
     cusps = list[float]()
     for name, test in problem.tests().items():
@@ -83,7 +88,7 @@ def _points(problem: CriticalCurve, step: BranchStep) -> Iterator[tuple[float, C
     counts = sorted(at.critical.growing for at in ends if at.critical is not None)
     index = counts[0]
     while index < counts[1]:
-        distance = step.zero_of_growth(index)
+        distance = step.zero(growth_of(index))
         critical = problem.critical(step.at(distance).z)
         value = complex(critical.values[index])
         paired = abs(value.imag) > REAL * critical.scale
@@ -166,9 +171,9 @@ def _part(
     for each in chain([start], walk(problem, start, limits, codimension_two)):
         if isinstance(each, CurvePoint):
             special.append(each)
-            if each.kind in problem.limits():
-                return points, special, f"{each.kind} at {digits_of(each.values)}"
         elif isinstance(each, Point):
             z, growing = each.z, 0 if each.critical is None else each.critical.growing
             points.append((z[-2:], problem.state(z), problem.frequency(z), problem.period(z), growing))
+        else:
+            break
     return points, special, str(each)

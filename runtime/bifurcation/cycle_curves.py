@@ -25,7 +25,7 @@ from scipy import linalg
 from synchain.models.dynamics.lift import lifted
 from synchain.models.dynamics.reduction import without_drive
 
-from .arclength import Test
+from .arclength import Point, Test
 from .critical_curve import CriticalCurve, CriticalEquations
 from .cycles import Cycles
 from .flow import TOLERANCE, Image, flow_of
@@ -36,6 +36,9 @@ from .transversal import expansion
 
 ONE_MODE = 1e-6
 """Largest part of the image of a mode's deviations that leaves the mode, relative to the image (a choice)."""
+
+AT_ONE = 1e-3
+"""Largest distance from 1 of a multiplier that is 1 where the cycles vanish: the root of the errors there (a choice)."""
 
 
 class CycleCurve(CriticalCurve):
@@ -220,12 +223,33 @@ class CycleCurve(CriticalCurve):
 
     def limits(self) -> Mapping[str, Test]:
         """Return functions that are positive on the curve; it ends where one is zero."""
-        if not self.is_pair:
-            return {}
-        return {
-            "1:1 resonance": lambda point: 1.0 - self.number(point.z),
-            "1:2 resonance": lambda point: 1.0 + self.number(point.z),
-        }
+
+        def amplitude(point: Point) -> float:
+            """Return the motion along that of the last point: a cycle that shrinks onto an equilibrium turns it round."""
+            return float(np.sum(self._motion(self.point) * self._motion(point.z)))
+
+        ends: dict[str, Test] = {}
+        if self.is_pair:
+            ends |= {
+                "1:1 resonance": lambda point: 1.0 - self.number(point.z),
+                "1:2 resonance": lambda point: 1.0 + self.number(point.z),
+            }
+        if not self.base.periods:
+            ends[""] = amplitude
+        return ends
+
+    def origin(self, z: np.ndarray) -> str:
+        """Name the point at which the cycles shrink onto a Hopf point, by the multiplier that is critical there."""
+        if self.is_fold:
+            return "Bautin"
+        return "zero-Hopf" if abs(self.critical_values(self.number(z))[0] - 1.0) < AT_ONE else "double Hopf"
+
+    def _motion(self, z: np.ndarray) -> np.ndarray:
+        """Return the rates (m, n) in the frame of the shifts, in units of the extents."""
+        base, point = self.base, self.solution(z)
+        m, n = base.phase.shape
+        frame = base.shifts @ point[m * n : m * n + base.shifts.shape[1]] / base.period(point)
+        return np.asarray((base.flow.rates(base.values(point), base.states(point)) - frame) / base.scale)
 
     def passing(self, value: complex) -> str:
         """Name the point at which another multiplier passes; real if its imaginary part is zero."""

@@ -19,14 +19,14 @@ Source: Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed. (Springer, 20
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.optimize import brentq
 
-from .arclength import ANGLE, Point, correct
+from .arclength import ANGLE, Point, Test, correct
 from .kinds import BifurcationKind
 from .problems import BranchProblem, GrowthNumbers
 
@@ -72,6 +72,11 @@ def critical_of(point: Point) -> GrowthNumbers:
     return point.critical
 
 
+def growth_of(index: int) -> Test:
+    """Return the growth of a critical value as a test function."""
+    return lambda point: float(critical_of(point).growth[index])
+
+
 class BranchStep:
     """The solutions on the hyperplanes between both ends of a step, by their distance from its beginning."""
 
@@ -100,7 +105,7 @@ class BranchStep:
         one = len(critical_of(point).values) == 1
         return max(critical_of(each).scale for each in ((self.before, self.after) if one else (point,)))
 
-    def zero(self, test: Callable[[Point], float]) -> float:
+    def zero(self, test: Test) -> float:
         """Return the distance at which a function of the solution passes zero."""
         ends = test(self.before), test(self.after)
         if ends[0] * ends[1] >= 0.0:  # one end is zero to rounding
@@ -110,33 +115,30 @@ class BranchStep:
             brentq(lambda h: test(self.at(h)), 0.0, self.length, xtol=tolerance, rtol=1e-14, maxiter=MOST_HALVINGS)
         )
 
-    def zero_of_growth(self, index: int) -> float:
-        """Return the distance at which the growth of a critical value passes zero."""
-        return self.zero(lambda point: float(critical_of(point).growth[index]))
-
     def tangent(self, distance: float) -> np.ndarray:
         """Return the tangent at a branch point, where Newton's method finds none: the mean of those on both sides."""
         sides = (min(max(distance + d * self.length, 0.0), self.length) for d in (-BESIDE[0], BESIDE[0]))
         return np.asarray(np.mean([self.at(side).tangent for side in sides], axis=0))
 
-    def branch_point(self, distance: float, index: int | None) -> Point:
-        """Return the branch point near a distance, where a growth passes zero, or for None where the parameter turns.
+    def singular_point(self, distance: float, test: Test | None) -> Point:
+        """Return the solution near a distance at which a test passes zero, or for None the parameter turns.
 
-        Newton's method has few digits there.  The solution follows from a polynomial through NODES regular ones.
+        Newton's method has few digits where branches meet, or a cycle vanishes.  The solution follows from a polynomial
+        through NODES regular ones.
         """
         nodes = -np.cos(np.pi * (np.arange(NODES + 1) + 0.5) / (NODES + 1))
         guess = 2.0 * distance / self.length - 1.0
         nodes = np.delete(nodes, np.abs(nodes - guess).argmin())
         points = [self.at(float(0.5 * self.length * (1.0 + x))) for x in nodes]
         columns = np.array([point.z for point in points]).T
-        if index is not None:
-            columns = np.vstack([columns, [critical_of(point).growth[index] for point in points]])
+        if test is not None:
+            columns = np.vstack([columns, [test(point) for point in points]])
         coefficients = np.linalg.solve(chebyshev.chebvander(nodes, NODES - 1), columns.T)
-        test = coefficients[:, -1]
-        roots = chebyshev.chebroots(chebyshev.chebder(test) if index is None else test)
+        last = coefficients[:, -1]
+        roots = chebyshev.chebroots(chebyshev.chebder(last) if test is None else last)
         real = roots[np.abs(roots.imag) < TOUCHING].real
         # Where values meet, the sorted growths are not smooth.
-        rough = index is not None and np.abs(test[-2:]).max() > CLEAR * np.abs(test).max()
+        rough = test is not None and np.abs(last[-2:]).max() > CLEAR * np.abs(last).max()
         if rough or not len(real) or np.abs(real - guess).min() > NEAR:
             return self.at(distance)
         x = float(real[np.abs(real - guess).argmin()])
@@ -192,7 +194,7 @@ def _found(step: BranchStep, indices: range, turned: bool) -> list[tuple[float, 
                 if min(map(abs, sides)) > CLEAR * scale:
                     break
             kind = problem.kind(complex(critical.values[touching].real), sides[0] * sides[1] < 0.0)
-            point = step.at(turn) if kind is BifurcationKind.FOLD else step.branch_point(turn, None)
+            point = step.at(turn) if kind is BifurcationKind.FOLD else step.singular_point(turn, None)
             located.append((turn, Located(kind, point, touching, scale)))
     for k, (distance, each) in enumerate(located):
         if each.kind is BifurcationKind.BRANCH_POINT:
@@ -224,13 +226,13 @@ def _passing(step: BranchStep, indices: range, turn: float | None) -> Iterator[t
     while index < indices.stop:
         turned = bool(neutral[index])
         # A fold is located better by the turn: its value is a square root of the parameter.
-        distance = turn if turned and turn is not None else step.zero_of_growth(index)
+        distance = turn if turned and turn is not None else step.zero(growth_of(index))
         critical = critical_of(step.at(distance))
         paired = abs(critical.values[index].imag) > REAL * critical.scale
         value = complex(critical.values[index])
         kind, point = step.problem.kind(value if paired else complex(value.real), turned), step.at(distance)
         scale = step.scale(point)
         if kind is BifurcationKind.BRANCH_POINT:
-            point = step.branch_point(distance, index)
+            point = step.singular_point(distance, growth_of(index))
         yield distance, Located(kind, point, index, scale)
         index += 2 if paired else 1

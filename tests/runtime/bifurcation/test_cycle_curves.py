@@ -11,6 +11,12 @@ import synchain as sc
 TURN = {"x": "x*(q - x**2 - y**2) - y", "y": "y*(q - x**2 - y**2) + x"}
 """A cycle of radius sqrt(q) and period 2 pi."""
 
+HALF = {
+    "u": "(p + x/2 - u**2 - w**2)*u + y*w/2 - w/2",
+    "w": "(p - x/2 - u**2 - w**2)*w + y*u/2 + u/2",
+}
+"""Deviations u, w from this cycle, which turn by half a turn in a period."""
+
 DUFFING = sc.Field({"x": "v", "v": "-x - x**3 - v/10 + F*cos(w*t)"}, parameters={"w": 1.2, "F": 0.3})
 
 
@@ -35,6 +41,37 @@ def test_folds_of_cycles_meet_in_a_cusp() -> None:
     assert curve.ends == ("c = -2.75", "c = -2.75")
 
 
+@pytest.mark.parametrize("unit", [1.0, 1e-4])
+def test_folds_of_cycles_end_where_the_cycle_vanishes(unit: float) -> None:
+    """r' = r (m + l r^2 - r^4): folds at m = -l^2/4, r^2 = l/2, which end in the Bautin point at m = l = 0 (C)."""
+    s = f"((x**2 + y**2)/{unit**2})"
+    rates = {"x": f"x*(m + l*{s} - {s}**2) - y", "y": f"y*(m + l*{s} - {s}**2) + x"}
+    scene = sc.Scene(sc.Field(rates, parameters={"m": -0.1, "l": 1}), integrator="dop853")
+    first = sc.periodic_orbit(scene, start=[0.95 * unit, 0], period=6)
+    fold = sc.follow(first, "m", to=-1).points["fold"][0]
+    curve = sc.follow(fold, ("m", "l"), within={"l": (-0.5, 2)})
+    np.testing.assert_allclose(curve.values[:, 0], -(curve.values[:, 1] ** 2) / 4, atol=1e-12)
+    np.testing.assert_allclose((curve.states**2).sum(axis=1) / unit**2, curve.values[:, 1] / 2, atol=1e-7)
+    assert curve.values[:, 1].min() > 0.0
+    (end,) = curve.special
+    assert end.kind == "Bautin"
+    np.testing.assert_allclose(end.values, [0, 0], atol=1e-8)
+    assert sorted(each.split(" at ")[0] for each in curve.ends) == ["Bautin", "l = 2"]
+
+
+def test_torus_points_end_in_a_zero_hopf_point() -> None:
+    """r' = r (q + z - z^2), z' = p + z^2 - r^2, z = h - 1: the divergence of the cycles q + z = z^2 is 2 z (C)."""
+    rise = "(q + (h - 1) - (h - 1)**2)"
+    rates = {"x": f"x*{rise} - y", "y": f"y*{rise} + x", "h": "p + (h - 1)**2 - x**2 - y**2"}
+    scene = sc.Scene(sc.Field(rates, parameters={"q": -0.01, "p": 0.04}))
+    orbit = sc.periodic_orbit(scene, start=[0.19, 0, 1.01], period=6.2)
+    (torus,) = sc.follow(orbit, "q", to=0.01).points["torus"]
+    curve = sc.follow(torus, ("q", "p"), within={"q": (-1, 1), "p": (-0.3, 0.05)}, direction="down")
+    (end,) = curve.points["zero-Hopf"]
+    np.testing.assert_allclose(end.values, [0, 0], atol=1e-10)
+    assert curve.ends[0].startswith("zero-Hopf at")
+
+
 def test_both_folds_of_a_resonance_lie_on_one_curve() -> None:
     """At F = 0.3 (F); between F and the cusp there is no fold."""
     orbit = sc.periodic_orbit(sc.Scene(DUFFING, initial={"x": 0.5, "v": 0}, transient=100))
@@ -51,11 +88,7 @@ def test_both_folds_of_a_resonance_lie_on_one_curve() -> None:
 
 def test_period_doublings_in_closed_form() -> None:
     """Deviations u, w from a cycle of radius sqrt(q) turn by half a turn and grow by p +- sqrt(q)/2 (C)."""
-    half = {
-        "u": "(p + x/2 - u**2 - w**2)*u + y*w/2 - w/2",
-        "w": "(p - x/2 - u**2 - w**2)*w + y*u/2 + u/2",
-    }
-    branch = sc.follow(cycle(TURN | half, p=-1, q=1), "p", to=-0.3)
+    branch = sc.follow(cycle(TURN | HALF, p=-1, q=1), "p", to=-0.3)
     (doubling,) = branch.points["period doubling"]
     assert doubling.value == pytest.approx(-0.5, abs=1e-12)
     curve = sc.follow(doubling, ("q", "p"), within={"q": (0.3, 2)})
@@ -63,6 +96,16 @@ def test_period_doublings_in_closed_form() -> None:
     assert {curve.values[0, 0], curve.values[-1, 0]} == {0.3, 2.0}
     assert curve.kind == "period doubling"
     assert curve.growing.max() == 0
+
+
+def test_period_doublings_end_in_a_double_hopf_point() -> None:
+    """The cycle shrinks onto the equilibrium at q = 0, where deviations u, w are neutral at p = 0 (C)."""
+    first = cycle(TURN | HALF, p=-0.6, q=1)
+    (doubling,) = sc.follow(first, "p", to=-0.4).points["period doubling"]
+    curve = sc.follow(doubling, ("q", "p"), within={"q": (-0.3, 1.1)}, direction="up")
+    (end,) = curve.points["double Hopf"]
+    np.testing.assert_allclose(end.values, [0, 0], atol=1e-10)
+    assert curve.ends[0].startswith("double Hopf at")
 
 
 def test_torus_points_and_their_resonances_in_closed_form() -> None:
