@@ -37,7 +37,7 @@ from synchain.models.inputs.checks import check_keys, check_positive, check_tabl
 from .arclength import FIRST_STEP, LARGEST_STEP, MOST, Limits, Point, correct, walk
 from .critical_curve import CriticalCurve
 from .cycle_curves import CycleCurve
-from .detection import REAL, TOGETHER, BranchStep, growth_of
+from .detection import REAL, TOGETHER, BranchStep
 from .equilibrium import Equilibrium
 from .equilibrium_curves import EquilibriumCurve
 from .kinds import BifurcationKind
@@ -88,9 +88,9 @@ def _points(problem: CriticalCurve, step: BranchStep) -> Iterator[tuple[float, C
     counts = sorted(at.critical.growing for at in ends if at.critical is not None)
     index = counts[0]
     while index < counts[1]:
-        distance = step.zero(growth_of(index))
+        distance = step.zero(step.growth(index))
         critical = problem.critical(step.at(distance).z)
-        value = complex(critical.values[index])
+        value = complex(critical.values[step.passing(distance, index)])
         paired = abs(value.imag) > REAL * critical.scale
         if kind := problem.passing(value if paired else complex(value.real)):
             yield point(kind, distance)

@@ -36,6 +36,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.run_keywords import with_numbers
 from .arclength import Point
+from .eigenvalues import eigenvalue_condition
 from .equilibrium import Equilibrium, shifted_components
 from .flow import TOLERANCE, Flow, Image, LiftedFlow, flow_of
 from .kinds import BifurcationKind
@@ -58,6 +59,9 @@ RESCALED = 2.0
 
 NOISE = 0.3
 """Integration error of an image that counts as zero, in units of the tolerance and the size of the motion (a choice)."""
+
+ROUNDING = 1e-10
+"""Error of the propagators, relative to the largest multiplier (a choice)."""
 
 MOST_STEPS, ASTRAY = 30, 1e4
 """Most steps of Newton's method at fixed parameters, and how far it may go in units of the motion (choices)."""
@@ -477,12 +481,20 @@ class Cycles:
     # --- stability ---
     def critical(self, z: np.ndarray) -> GrowthNumbers:
         """Return all multipliers but those of the motion itself and of the shifts."""
-        along = self.multipliers(z)
-        blocks = np.full(len(along), -1)
+        values = self.multipliers(z)
+        blocks = np.full(len(values), -1)
         if self.transversal is not None:
             across, of = self.transversal.multipliers(self.values(z), self.at_drive(z)[0], self.period(z), self.scale)
-            along, blocks = np.concatenate([along, across]), np.concatenate([blocks, of])
-        return GrowthNumbers.of(np.abs(along) - 1.0, along, blocks)
+            values, blocks = np.concatenate([values, across]), np.concatenate([blocks, of])
+
+        def condition(indices: np.ndarray) -> np.ndarray:
+            """Return the condition of multipliers along the quotient; those across it belong to small blocks."""
+            matrices = self._reduced(z)[0]
+            product = np.linalg.multi_dot([np.eye(matrices.shape[1]), *matrices[::-1], np.eye(matrices.shape[1])])
+            sizes = np.full(product.shape, np.abs(product).max())
+            return np.where(blocks[indices] < 0, eigenvalue_condition(product, values[indices], sizes), 0.0)
+
+        return GrowthNumbers.of(np.abs(values) - 1.0, values, blocks, ROUNDING, condition)
 
     def multipliers(self, z: np.ndarray) -> np.ndarray:
         """Return the multipliers along the quotient, without those of the motion itself and of the shifts."""

@@ -72,11 +72,6 @@ def critical_of(point: Point) -> GrowthNumbers:
     return point.critical
 
 
-def growth_of(index: int) -> Test:
-    """Return the growth of a critical value as a test function."""
-    return lambda point: float(critical_of(point).growth[index])
-
-
 class BranchStep:
     """The solutions on the hyperplanes between both ends of a step, by their distance from its beginning."""
 
@@ -114,6 +109,25 @@ class BranchStep:
         return float(
             brentq(lambda h: test(self.at(h)), 0.0, self.length, xtol=tolerance, rtol=1e-14, maxiter=MOST_HALVINGS)
         )
+
+    def growth(self, index: int) -> Test:
+        """Return the growth of a critical value as a test function."""
+        return lambda point: float((critical_of(point).signed if self.hidden else critical_of(point).growth)[index])
+
+    @property
+    def hidden(self) -> bool:
+        """Whether a value is zero at both ends, as that of a conserved quantity: without a sign, it may hide others."""
+        return all(critical_of(end).neutral for end in (self.before, self.after))
+
+    def passing(self, distance: float, index: int) -> int:
+        """Return the index at a distance of the value that passes as the index-th one."""
+        critical = critical_of(self.at(distance))
+        if not self.hidden:
+            return index
+        # Of all that are zero there, the nearest to the one that has passed where more values grow.
+        end = max(map(critical_of, (self.before, self.after)), key=lambda each: each.growing)
+        zero = np.where(np.abs(critical.growth) <= critical.errors, 0.0, np.inf)
+        return int((zero + np.abs(critical.values - end.values[end.growth > end.errors][index])).argmin())
 
     def tangent(self, distance: float) -> np.ndarray:
         """Return the tangent at a branch point, where Newton's method finds none: the mean of those on both sides."""
@@ -226,13 +240,14 @@ def _passing(step: BranchStep, indices: range, turn: float | None) -> Iterator[t
     while index < indices.stop:
         turned = bool(neutral[index])
         # A fold is located better by the turn: its value is a square root of the parameter.
-        distance = turn if turned and turn is not None else step.zero(growth_of(index))
+        distance = turn if turned and turn is not None else step.zero(step.growth(index))
         critical = critical_of(step.at(distance))
-        paired = abs(critical.values[index].imag) > REAL * critical.scale
-        value = complex(critical.values[index])
+        passing = step.passing(distance, index)
+        value = complex(critical.values[passing])
+        paired = abs(value.imag) > REAL * critical.scale
         kind, point = step.problem.kind(value if paired else complex(value.real), turned), step.at(distance)
         scale = step.scale(point)
         if kind is BifurcationKind.BRANCH_POINT:
-            point = step.singular_point(distance, growth_of(index))
-        yield distance, Located(kind, point, index, scale)
+            point = step.singular_point(distance, step.growth(index))
+        yield distance, Located(kind, point, passing, scale)
         index += 2 if paired else 1

@@ -19,13 +19,14 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.run_keywords import with_numbers
 from .arclength import Point
-from .eigenvalues import SMALL, ModeBlocks, eigenvalues
+from .eigenvalues import DENSE, SMALL, ModeBlocks, eigenvalue_condition, eigenvalues
 from .equilibrium import Equilibrium, bordered, resting_equations
 from .kinds import BifurcationKind
 from .linearised import Linearised
 from .problems import GrowthNumbers, Matrix
 
 NOISE = 1e-14  # residual that counts as zero, relative to the sizes of its terms: 45 rounding errors (a choice)
+ROUNDING = 1e-12  # error of the Jacobian relative to its largest eigenvalue (a choice)
 LEAST_SCALE = 0.1  # least scale of a component in lengths, relative to that of the largest component (a choice)
 # Factor by which the scale of states near zero is lowered, and the ratio of rates at which it is low enough (a
 # choice).
@@ -207,7 +208,17 @@ class Equilibria:
         if self.shifts:
             others = np.argsort(np.abs(numbers), kind="stable")[len(self.shifts) :]
             numbers, modes = numbers[others], None if modes is None else modes[others]
-        return GrowthNumbers.of(numbers.real, numbers, modes)
+
+        def condition(indices: np.ndarray) -> np.ndarray:
+            """Return the condition of eigenvalues of the network, or of the blocks of their modes."""
+            if self.blocks is not None and modes is not None:
+                return np.array([self.blocks.condition(jacobian, modes[k], numbers[k]) for k in indices])
+            if len(state) > DENSE:  # of the few eigenvalues nearest to zero none is known so well
+                return np.zeros(len(indices))
+            matrix = jacobian.toarray() if mass is None else np.linalg.solve(mass.toarray(), jacobian.toarray())
+            return eigenvalue_condition(matrix, numbers[indices], np.abs(matrix))
+
+        return GrowthNumbers.of(numbers.real, numbers, modes, ROUNDING, condition)
 
     def kind(self, value: complex, turned: bool) -> BifurcationKind:
         """Name a bifurcation by its eigenvalue."""

@@ -6,6 +6,7 @@ The last unknown is the parameter.  `arclength` solves and follows any problem, 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
@@ -22,20 +23,37 @@ class GrowthNumbers(NamedTuple):
     growth: np.ndarray  # (k,): distance past neutrality, real part or |multiplier| - 1; the largest first
     values: np.ndarray  # (k,) complex, in the same order
     blocks: np.ndarray  # (k,): index of the mode of the graph; -1 if a value belongs to the whole network
+    errors: np.ndarray  # (k,): growth that counts as zero
 
     @classmethod
-    def of(cls, growth: np.ndarray, values: np.ndarray, blocks: np.ndarray | None = None) -> GrowthNumbers:
-        """Sort values by their growth; the members of a pair have equal growth and stay together."""
+    def of(
+        cls,
+        growth: np.ndarray,
+        values: np.ndarray,
+        blocks: np.ndarray | None,
+        relative: float,
+        condition: Callable[[np.ndarray], np.ndarray],
+    ) -> GrowthNumbers:
+        """Sort values by their growth; the members of a pair have equal growth and stay together.
+
+        `relative` is the error of the matrices, and `condition` returns the factors (u,) by which the values at some
+        indices (u,) magnify it: that of a conserved momentum is known to the root of rounding.
+        """
         blocks = np.full(len(values), -1) if blocks is None else blocks
+        scale = float(np.abs(values).max(initial=0.0)) or 1.0
+        errors = np.full(len(values), relative * scale)
+        unsure = np.flatnonzero((np.abs(growth) > errors) & (np.abs(growth) < UNSURE * scale))
+        if len(unsure):
+            errors[unsure] = np.clip(relative * condition(unsure), relative * scale, UNSURE * scale)
         order = np.lexsort((-values.imag, np.abs(values.imag), -growth))
-        return cls(growth[order], values[order], blocks[order])
+        return cls(growth[order], values[order], blocks[order], errors[order])
 
     def without(self, values: list[complex]) -> GrowthNumbers:
         """Leave out the number that is nearest to each value."""
         kept = np.arange(len(self.values))
         for value in values:
             kept = np.delete(kept, np.abs(self.values[kept] - value).argmin())
-        return GrowthNumbers(self.growth[kept], self.values[kept], self.blocks[kept])
+        return GrowthNumbers(self.growth[kept], self.values[kept], self.blocks[kept], self.errors[kept])
 
     @property
     def scale(self) -> float:
@@ -43,13 +61,24 @@ class GrowthNumbers(NamedTuple):
         return float(np.abs(self.values).max(initial=0.0)) or 1.0
 
     @property
+    def signed(self) -> np.ndarray:
+        """Growths (k,), the largest first; those that are zero to their errors count as decaying by the errors."""
+        return -np.sort(-np.where(np.abs(self.growth) > self.errors, self.growth, -self.errors))
+
+    @property
+    def neutral(self) -> bool:
+        """Whether a value is zero to its error."""
+        return bool((np.abs(self.growth) <= self.errors).any())
+
+    @property
     def growing(self) -> int:
-        """Number of values past neutrality by more than rounding."""
-        return int((self.growth > ROUNDING * self.scale).sum())
+        """Number of values past neutrality by more than their errors."""
+        return int((self.growth > self.errors).sum())
 
 
-ROUNDING = 1e-12
-"""Growth that counts as zero, relative to the largest value: some thousand rounding errors (a choice)."""
+UNSURE = 1e-6
+"""Growth of which the error is estimated, relative to the largest value: a thousand roots of rounding, to which the
+error of a multiple eigenvalue is known (a choice)."""
 
 
 class BranchProblem(Protocol):

@@ -353,3 +353,27 @@ def test_a_diagram_draws_observables_and_reads_as_its_branches(tmp_path: Path) -
         sc.diagram()
     with pytest.raises(TypeError, match="diagram: found 3"):
         sc.diagram(3)
+
+
+def test_conserved_quantities_hide_no_branch_points_and_make_none() -> None:
+    """Mass moves between u and w: the mode of 2 - 2 cos(2 pi k/5) is neutral at det(A - lambda H) = 0 (C)."""
+    rate = "(w*(k + u**2/(1 + u**2)) - u)"
+    cell = sc.Field({"u": rate, "w": f"-{rate}"}, parameters={"k": 0.067})
+    link = sc.Rates({"u": "D*W*(u_j - u_i)", "w": "10*W*(w_j - w_i)"}, {"D": 0.2})
+    first = sc.equilibrium(sc.Scene(cell, link, sc.graphs.ring(5), initial={"u": 0.6, "w": 1.6}))
+    branch = sc.follow(first, "D", to=0.005)
+    u, w = first.state[[0, -1]]
+    by_u, by_w = w * 2 * u / (1 + u**2) ** 2 - 1, 0.067 + u**2 / (1 + u**2)
+    waves = 2 - 2 * np.cos(2 * np.pi * np.array([1, 2]) / 5)
+    assert [(str(each.kind), each.multiplicity) for each in branch.bifurcations] == [("branch point", 2)] * 2
+    expected = 10 * by_u / (10 * waves + by_w)
+    np.testing.assert_allclose([each.value for each in branch.bifurcations], expected, rtol=1e-9)
+
+
+def test_a_conserved_momentum_passes_nowhere() -> None:
+    """Rotors that feel only each other: a double eigenvalue 0 with one vector is known to the root of rounding."""
+    rotor = sc.Field({"delta": "w", "w": "0*w"})
+    link = sc.Rates({"w": "K*W*sin(delta_j - delta_i) + 0.3*W*(w_j - w_i)"}, {"K": 2})
+    twist = 2 * np.pi * np.arange(5) / 5
+    first = sc.equilibrium(sc.Scene(rotor, link, sc.graphs.ring(5), initial={"delta": twist}))
+    assert sc.follow(first, "K", to=0.3).bifurcations == ()
