@@ -29,17 +29,21 @@ from .dense import inside
 # --- kernel text below ---
 # Groups of `pushes` and `strike`: six in front of the looks, the others behind the numbers on jumps in time.
 LEVEL, GAP, MODE, SPEED, RATE, RATIO, LAW, NUMBER, SIZE, K = 0, 1, 2, 3, 4, 5, 9, 10, 11, 12
-OF_SIGN, OF_STOP, OF_RESET = 0.0, 1.0, 2.0
+OF_SIGN, OF_STOP, OF_RESET, OF_STOP_IN_ORDER = 0.0, 1.0, 2.0, 3.0
 # What an event means for a row: nothing, its mode is known, it is decided, it lets go to the side of its force.
 UNTOUCHED, KNOWN, OPEN, RELEASED = 0.0, 1.0, 2.0, 3.0
-# Columns of the notes on rows: what the event means, mode and speed before, x before, 1 if the gap has closed.
-ROLE, BEFORE, SPEED_BEFORE, X, SHUT = 0, 1, 2, 3, 4
+# Columns of the notes on rows: what the event means, mode and speed before, x before, 1 if the gap has closed, the sum
+# of the changes of speed by impulses without their signs.
+ROLE, BEFORE, SPEED_BEFORE, X, SHUT, FELT = 0, 1, 2, 3, 4, 5
+NOTES = 6
 # A pivot, or a change of a speed, this much smaller than what it is the difference of is zero.
 NONE = 1e-12
 # The part of the terms of a gap with which it is compared: PASSED (passages.py) of it are 7 rounding errors of the terms.
 PART = 1.0 / 64.0
 # Height of the last rebound of a stop over that of the first ones (a choice).
 LOWEST = 1e-12
+# Most passes over stops that rebound in order (a choice).
+PASSES = 10000
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -108,6 +112,13 @@ def place(group, row, dims):
 def number(group, row, lane, out, dims):
     """Return a number of a row in one lane."""
     return out[place(group, row, dims) * WIDTH + lane]
+
+
+@njit(error_model="numpy", forceinline=True)
+def is_stop(row, lane, out, dims):
+    """Return True if a row is a stop."""
+    law = number(LAW, row, lane, out, dims)
+    return law != OF_SIGN and law != OF_RESET
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -208,7 +219,7 @@ def agrees(modes, chosen, decided, x, slack, lane, first, size, out, dims):
         if not decided[a]:
             continue
         row = first + a
-        stop, ratio = number(LAW, row, lane, out, dims) == OF_STOP, number(RATIO, row, lane, out, dims)
+        stop, ratio = is_stop(row, lane, out, dims), number(RATIO, row, lane, out, dims)
         if chosen[a]:
             good = x[a] >= -slack if stop else abs(x[a]) <= ratio + slack * ratio
         else:
@@ -234,7 +245,7 @@ def known_modes(notes, modes, decided, lane, first, size, out, dims):
         modes[a] = number(MODE, row, lane, out, dims)
         if notes[row, ROLE] == RELEASED:
             # a stop opens, a contact slips to the side of its force
-            opens = number(LAW, row, lane, out, dims) == OF_STOP
+            opens = is_stop(row, lane, out, dims)
             modes[a] = 1.0 if opens or notes[row, X] > 0.0 else -1.0
     return count
 
@@ -250,7 +261,7 @@ def choose(code, notes, modes, chosen, decided, lane, first, size, out, dims):
         chosen[a] = False
         if decided[a]:
             left, digit = left // 3, left % 3
-            if digit == 2 and number(LAW, first + a, lane, out, dims) == OF_STOP:
+            if digit == 2 and is_stop(first + a, lane, out, dims):
                 return -1, 0
             chosen[a] = digit == 0
             modes[a] = 0.0 if digit == 0 else 1.0 if digit == 1 else -1.0
@@ -334,51 +345,91 @@ def begin_event(notes, lane, first, size, friction):
         if shut and law == OF_RESET:
             put(out, place(K + dims.felt + 2, row, dims), lane, 1.0)
             outcome = 1
-        hit[a] = shut and law == OF_STOP and not chosen[a]
-    for a in range(size):
-        if hit[a]:
-            outcome = max(outcome, 1)
-            for b in range(size):
-                other = b != a and number(LAW, first + b, lane, out, dims) == OF_STOP
-                if other and (hit[b] or chosen[b]) and number(K + b, first + a, lane, out, dims) != 0.0:
-                    outcome = 2
-    if outcome == 1:
-        rebound(notes, hit, speeds, x, lane, first, size, friction)
+        hit[a] = shut and is_stop(row, lane, out, dims) and not chosen[a]
+        outcome = 1 if hit[a] else outcome
+    if outcome == 1 and not rebound(notes, hit, speeds, x, lane, first, size, friction):
+        outcome = 2
     return outcome
 
 
 @njit(error_model="numpy")
 def rebound(notes, hit, speeds, x, lane, first, size, friction):
-    """Set the impulses of the stops that are hit, and put their gaps to zero."""
-    out, dims, impacts = friction.out, friction.dims, friction.impacts
+    """Set the impulses of the stops that are hit, and put their gaps to zero; return False if Newton's law fixes none.
+
+    An impulse changes the speeds at other stops.  Those that are hit or closed then rebound too, if all are in order.
+    """
+    out, dims = friction.out, friction.dims
+    left, coupled = np.zeros(size, np.bool_), False
     for a in range(size):
-        if not hit[a]:
-            continue
-        row = first + a
-        level, stiff, e = (
-            number(LEVEL, row, lane, out, dims),
-            number(K + a, row, lane, out, dims),
-            number(RATIO, row, lane, out, dims),
-        )
-        put(out, place(K + dims.felt + 1, row, dims), lane, -level / stiff)
-        if speeds[a] < 0.0:
-            continue
-        inward = number(RATE, row, lane, out, dims)
-        for b in range(size):
-            inward -= number(K + b, row, lane, out, dims) * x[b]
-        # The speed at the gap 0, a depth before: energy is kept although the gap is put to zero.
-        speed = math.sqrt(max(speeds[a] * speeds[a] + 2.0 * inward * level, 0.0))
-        after = e * speed
-        hardest = max(impacts[row * WIDTH + lane], speed)
-        strongest = max(impacts[(dims.rows + row) * WIDTH + lane], abs(inward))
-        # heights after**2/(2 inward) and hardest**2/(2 strongest)
-        if inward > 0.0 and e < 1.0 and after * after * strongest <= LOWEST * hardest * hardest * inward:
-            after = 0.0
-        if after == 0.0:
-            notes[row, ROLE], hardest, strongest = OPEN, 0.0, 0.0
-        put(impacts, row, lane, hardest)
-        put(impacts, dims.rows + row, lane, strongest)
-        put(out, place(K + dims.felt, row, dims), lane, (speeds[a] + after) / stiff)
+        if hit[a]:
+            row = first + a
+            left[a] = speeds[a] >= 0.0
+            stiff = number(K + a, row, lane, out, dims)
+            put(out, place(K + dims.felt + 1, row, dims), lane, -number(LEVEL, row, lane, out, dims) / stiff)
+    turn, again = 0, True
+    while again:
+        if turn == PASSES:
+            return False
+        again = False
+        for a in range(size):
+            if not left[a]:
+                continue
+            row, left[a] = first + a, False
+            impulse = impulse_of(notes, speeds, x, turn, a, lane, first, size, friction)
+            put(out, place(K + dims.felt, row, dims), lane, number(K + dims.felt, row, lane, out, dims) + impulse)
+            for b in range(size):
+                change = number(K + a, first + b, lane, out, dims) * impulse
+                notes[first + b, FELT] += abs(change)
+                if b == a or change == 0.0:
+                    continue
+                speeds[b] -= change
+                touches = is_stop(first + b, lane, out, dims) and (
+                    hit[b] or number(MODE, first + b, lane, out, dims) == 0.0
+                )
+                if touches and not (in_order(row, lane, out, dims) and in_order(first + b, lane, out, dims)):
+                    return False
+                coupled = coupled or touches
+                left[b] = touches and speeds[b] > NONE * notes[first + b, FELT]
+                again = again or left[b]
+        turn += 1
+    for a in range(size):
+        if coupled and hit[a]:
+            moves_away = speeds[a] < -NONE * notes[first + a, FELT]
+            notes[first + a, ROLE] = KNOWN if moves_away else OPEN
+    return True
+
+
+@njit(error_model="numpy", forceinline=True)
+def in_order(row, lane, out, dims):
+    """Return True if a row is a stop that rebounds in order."""
+    return number(LAW, row, lane, out, dims) == OF_STOP_IN_ORDER
+
+
+@njit(error_model="numpy")
+def impulse_of(notes, speeds, x, turn, a, lane, first, size, friction):
+    """Return the impulse of a stop by Newton's law, and change the speed of its gap; `turn` counts from its first impulse."""
+    out, dims, impacts, row = friction.out, friction.dims, friction.impacts, first + a
+    stiff, inward = number(K + a, row, lane, out, dims), number(RATE, row, lane, out, dims)
+    for b in range(size):
+        inward -= number(K + b, row, lane, out, dims) * x[b]
+    # The speed at the gap 0, a depth before: energy is kept although the gap is put to zero.
+    depth = number(LEVEL, row, lane, out, dims) if turn == 0 else 0.0
+    speed = math.sqrt(max(speeds[a] * speeds[a] + 2.0 * inward * depth, 0.0))
+    e = number(RATIO, row, lane, out, dims)
+    after = e * speed
+    hardest = max(impacts[row * WIDTH + lane], speed)
+    strongest = max(impacts[(dims.rows + row) * WIDTH + lane], abs(inward))
+    # heights after**2/(2 inward) and hardest**2/(2 strongest); impulses in turn have no height
+    low = inward > 0.0 and after * after * strongest <= LOWEST * hardest * hardest * inward
+    if e < 1.0 and (low or (turn > 0 and after * after <= LOWEST * hardest * hardest)):
+        after = 0.0
+    if after == 0.0:
+        notes[row, ROLE], hardest, strongest = OPEN, 0.0, 0.0
+    put(impacts, row, lane, hardest)
+    put(impacts, dims.rows + row, lane, strongest)
+    impulse = (speeds[a] + after) / stiff
+    speeds[a] = -after
+    return impulse
 
 
 @njit(error_model="numpy")
@@ -388,14 +439,15 @@ def after_jump(notes, lane, first, size, friction):
     for a in range(size):
         row = first + a
         law, mode = number(LAW, row, lane, out, dims), number(MODE, row, lane, out, dims)
-        speed = number(SPEED, row, lane, out, dims)
+        speed, before = number(SPEED, row, lane, out, dims), notes[row, SPEED_BEFORE]
+        jump, small = speed - before, NONE * max(notes[row, FELT], max(abs(speed), abs(before)))
         if law == OF_SIGN and notes[row, ROLE] == KNOWN:
             put(out, place(MODE, row, dims), lane, -mode if mode * speed < 0.0 else mode)
         elif law == OF_SIGN:
-            if abs(speed - notes[row, SPEED_BEFORE]) > NONE * max(abs(speed), 1e-3):
+            if abs(jump) > small:
                 notes[row, ROLE] = KNOWN
                 put(out, place(MODE, row, dims), lane, 1.0 if speed > 0.0 else -1.0)
-        elif law == OF_STOP and mode == 0.0 and speed - notes[row, SPEED_BEFORE] < -NONE * max(abs(speed), 1e-3):
+        elif is_stop(row, lane, out, dims) and mode == 0.0 and jump < -small:
             notes[row, ROLE] = KNOWN
             put(out, place(MODE, row, dims), lane, 1.0)
 
@@ -423,7 +475,7 @@ def project_held(lane, first, size, friction):
         if chosen[a]:
             row, found = first + a, True
             put(out, place(K + felt, row, dims), lane, right[a])
-            if number(LAW, row, lane, out, dims) == OF_STOP:
+            if is_stop(row, lane, out, dims):
                 stiff = number(K + a, row, lane, out, dims)
                 put(out, place(K + felt + 1, row, dims), lane, -number(LEVEL, row, lane, out, dims) / stiff)
     return found
@@ -501,7 +553,7 @@ def change_modes(moved, t, y, friction):
     clear_scales(friction)
     events = lane_bits(moved & (smallest_gap(t, y, y, friction) <= 0.0))
     clear_impulses(friction)
-    notes = np.zeros((WIDTH, friction.dims.rows, 5))
+    notes = np.zeros((WIDTH, friction.dims.rows, NOTES))
     # 1. Speeds jump: stops rebound, guards reset states, held rows return to their surfaces.
     struck = begin_events(lane_bits(moved), notes, friction)
     if struck:

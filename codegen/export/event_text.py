@@ -35,7 +35,7 @@ def strike(t: float, state: Doubles, numbers: Doubles, rows: Doubles) -> None:
 # --- exported text below ---
 LEVEL, GAP, MODE, SPEED, RATE, RATIO, LAW, NUMBER = 0, 1, 2, 3, 4, 5, 6, 7
 IMPULSE, LIFT, FIRES, ROLE, BEFORE, SPEED_BEFORE, X, SHUT = 8, 9, 10, 11, 12, 13, 14, 15
-SIZE, SCALE, HARDEST, STRONGEST, K = 16, 17, 18, 19, 20
+SIZE, SCALE, HARDEST, STRONGEST, FELT, K = 16, 17, 18, 19, 20, 21
 OF_SIGN, OF_STOP, OF_RESET = 0, 1, 2
 UNTOUCHED, KNOWN, OPEN, RELEASED = 0, 1, 2, 3
 FINISHED, AMBIGUOUS, CHATTERING, NO_STEP = 0, 1, 2, 3
@@ -260,6 +260,12 @@ def begin_event(first: int, size: int, rows: Doubles) -> int:
         hit = shut and rows[at + LAW] == OF_STOP and modes[a] != 0.0
         if hit and rebound(modes, x, a, first, size, rows) == 0:
             outcome = AMBIGUOUS
+    # the sum of the changes of each speed by impulses, without their signs
+    for a in range(size):
+        at = (first + a) * GROUPS
+        rows[at + FELT] = 0.0
+        for b in range(size):
+            rows[at + FELT] += abs(rows[at + K + b] * rows[(first + b) * GROUPS + IMPULSE])
     return outcome
 
 
@@ -270,7 +276,7 @@ def after_jump(first: int, size: int, rows: Doubles) -> None:
         speed = rows[at + SPEED]
         mode = rows[at + MODE]
         jump = speed - rows[at + SPEED_BEFORE]
-        small = NONE * max(abs(speed), 1e-3)
+        small = NONE * max(rows[at + FELT], max(abs(speed), abs(rows[at + SPEED_BEFORE])))
         if rows[at + LAW] == OF_SIGN and rows[at + ROLE] == KNOWN:
             rows[at + MODE] = -mode if mode * speed < 0.0 else mode
         elif rows[at + LAW] == OF_SIGN and abs(jump) > small:

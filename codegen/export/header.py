@@ -32,6 +32,8 @@ class Exported:
         model.expect_pairs(f"export to {language}")
         if model.joined:
             raise ValueError(f"export to {language}: found contacts or stops in links; expected links of forces alone")
+        if any(row.in_order for node in model.nodes for row in node.rows):
+            raise ValueError(f"export to {language}: found stops with in_order = True; expected False")
         check_inertia(model, language)
         numbers = dict(zip(model.parameters, checked.values(), strict=bool(checked)))
 

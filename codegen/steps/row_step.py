@@ -38,7 +38,13 @@ from .safe_names import NAMES
 from .step import lane
 
 LAWS = {Law.SIGN: 0, Law.STOP: 1, Law.RESET: 2}  # the numbers of laws in the driver
+STOP_IN_ORDER = 3
 LEVEL, GAP, MODE, SPEED, RATE, RATIO = range(6)  # the groups of numbers in front of the looks
+
+
+def law_number(row: Row) -> sp.Integer:
+    """Return the number of the law of a row in the driver."""
+    return sp.Integer(STOP_IN_ORDER if row.in_order else LAWS[row.law])
 
 
 def most_rows(equations: Equations) -> int:
@@ -182,7 +188,7 @@ class _WrittenOut(_Writer):
                 mode = sp.S.One if row.law is Law.RESET else row.mode
                 columns += (row.level, row.gap, mode, row.speed, row.rate, row.ratio)
                 places += [self.place(k, number) for k in range(6)]
-                columns += (sp.Integer(LAWS[row.law]), sp.Integer(a), row.size, *_full(group.rows, row))
+                columns += (law_number(row), sp.Integer(a), row.size, *_full(group.rows, row))
                 places += [self.behind(k, number) for k in range(3 + len(group.rows))]
         return columns, places
 
@@ -294,7 +300,7 @@ class _Looped(_Writer):
         for a, row in enumerate(node.rows):
             columns += [row.level, sp.S.One if row.law is Law.RESET else row.mode, row.speed, row.rate, row.ratio]
             places += [self.place(group, self.row(number, a)) for group in (LEVEL, MODE, SPEED, RATE, RATIO)]
-            columns += [sp.Integer(LAWS[row.law]), sp.Integer(a), term_size(row.level), *_full(node.rows, row)]
+            columns += [law_number(row), sp.Integer(a), term_size(row.level), *_full(node.rows, row)]
             places += [self.behind(group, self.row(number, a)) for group in range(3 + len(node.rows))]
         symbols, stores = self.stored("out", columns, places)
         used |= symbols

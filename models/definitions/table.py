@@ -35,7 +35,7 @@ _LAGRANGIAN = (
 )
 _LAW = ("name", "source", "parameters", "force", "static", "order", "self_exciting")
 _LINK = ("name", "source", "parameters", "energies", "on")
-_EVENTS = {"friction": ("load", "law"), "stop": ("restitution",), "reset": ("sets",)}
+_EVENTS = {"friction": ("load", "law"), "stop": ("restitution", "in_order"), "reset": ("sets",)}
 _ENERGIES = ("potential", "dissipation", "kinetic")
 
 
@@ -125,7 +125,9 @@ def _events(owner: str, value: object) -> list[EventDefinition]:
         if kind == "friction":
             found.append(Friction(level, _text(f"{what}: load", event.get("load", 1)), _law(event.get("law"))))
         elif kind == "stop":
-            found.append(Stop(level, _text(f"{what}: restitution", event.get("restitution", 0))))
+            restitution = _text(f"{what}: restitution", event.get("restitution", 0))
+            in_order: Any = event.get("in_order", False)
+            found.append(Stop(level, restitution, in_order))
         else:
             found.append(Reset(level, _texts(f"{what}: sets", event.get("sets", {}))))
     return found
@@ -205,7 +207,8 @@ def _event_table(event: EventDefinition, texts: _Texts | Potential) -> dict[str,
         law = {} if not isinstance(event.law, FrictionLaw) else {"law": as_name_or_table(event.law)}
         return {"friction": texts.write(event.sliding), "load": texts.write(event.load), **law}
     if isinstance(event, Stop):
-        return {"stop": texts.write(event.gap), "restitution": texts.write(event.restitution)}
+        table = {"stop": texts.write(event.gap), "restitution": texts.write(event.restitution)}
+        return table | ({"in_order": True} if event.in_order else {})
     return {"reset": texts.write(event.guard), "sets": {s: texts.write(e) for s, e in event.sets.items()}}
 
 

@@ -138,7 +138,7 @@ def node(
     zeros = [sp.S.Zero] * len(positions)
     for stop in stops:
         push = solve_masses(masses, [derivative(stop.gap, x) for x in positions], velocities)
-        surfaces.append(Surface(Law.STOP, stop.gap, (*zeros, *push), stop.restitution))
+        surfaces.append(Surface(Law.STOP, stop.gap, (*zeros, *push), stop.restitution, in_order=stop.in_order))
     surfaces += _resets(events)
     node = _with_surfaces((*positions, *velocities), (*velocities, *smooth), surfaces, speeds, symbols, of_links)
     return replace(node, law=law, inertia=inertia)

@@ -159,7 +159,7 @@ def part_template(nodes: tuple[Node, ...], links: tuple[PartLink, ...], varied: 
         column = [sp.S.Zero] * len(state)
         for k, e in zip(pushed, placed.push, strict=False):
             column[k] = e
-        surfaces.append(Surface(placed.law, placed.level, tuple(column), placed.ratio, placed.sets))
+        surfaces.append(replace(placed, push=tuple(column)))
         modes.extend([] if mode is None else [mode])
 
     def places(m: int) -> range:

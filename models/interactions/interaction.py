@@ -191,7 +191,7 @@ class Potential:
 
     >>> stop = sc.Potential(0, {"e": 0.9}, events=[sc.Stop(j.x - i.x, restitution="e")])
     >>> stop.events
-    (Stop(gap=-x_i + x_j, restitution=e),)
+    (Stop(gap=-x_i + x_j, restitution=e, in_order=False),)
     """
 
     energy: sp.Expr

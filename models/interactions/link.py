@@ -112,7 +112,7 @@ def _surfaces(coupling: Coupling, pair: Pair, terms: Terms) -> tuple[Surface, ..
                     f"coupling '{coupling}': found the gap {event.gap}; expected a function of coordinates and time"
                 )
             column = push(partial(derivative, event.gap), 0)
-            surfaces.append(Surface(Law.STOP, event.gap, column, event.restitution))
+            surfaces.append(Surface(Law.STOP, event.gap, column, event.restitution, in_order=event.in_order))
             continue
         sliding = sp.expand(event.sliding)
         slopes = [derivative(sliding, v) for v in pair.velocities]

@@ -69,6 +69,10 @@ class Stop:
         The distance to the stop, a function of coordinates and time.
     restitution : Expr, number or str
         Speed after over speed before the impact, from 0 to 1.
+    in_order : bool
+        What happens if stops that influence each other are hit at the same time, where Newton's law has no unique answer.
+        True: they rebound one after another, a node's own stops first, then those of the links in the order of the graph,
+        again and again until no body approaches one.  False: the cell ends as AMBIGUOUS.
 
     See Also
     --------
@@ -85,11 +89,12 @@ class Stop:
     >>> y, v, g, e = sp.symbols("y v g e")
     >>> ball = Lagrangian(v**2/2, g*y, coordinates={y: v}, parameters={g: 9.81, e: 0.8}, events=[Stop(y, restitution=e)])
     >>> ball.model.events
-    (Stop(gap=y, restitution=e),)
+    (Stop(gap=y, restitution=e, in_order=False),)
     """
 
     gap: Any
     restitution: Any = 0
+    in_order: bool = False
 
     @property
     def expressions(self) -> tuple[sp.Expr, ...]:
@@ -101,7 +106,9 @@ class Stop:
         e = change("restitution", self.restitution)
         if e.is_number and not 0 <= e <= 1:
             raise ValueError(f"stop {self.gap}: found the restitution {e}; expected a number from 0 to 1")
-        return Stop(change("gap", self.gap), e)
+        if not isinstance(self.in_order, bool):
+            raise TypeError(f"stop {self.gap}: found in_order = {self.in_order!r}; expected True or False")
+        return Stop(change("gap", self.gap), e, self.in_order)
 
 
 @dataclass(frozen=True, slots=True)

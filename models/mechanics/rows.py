@@ -59,6 +59,7 @@ class Surface:
     ratio: sp.Expr = sp.S.One  # SIGN: static over kinetic friction; STOP: restitution
     sets: tuple[tuple[sp.Symbol, sp.Expr], ...] = ()  # RESET: the values just after
     name: str = ""  # ending of the name of the mode if a node has several
+    in_order: bool = False  # STOP: hit together with others that it influences, they rebound one after another
 
     @property
     def expressions(self) -> Column:
@@ -94,6 +95,7 @@ class Row:
     lift: Column  # what one unit of a stop's correction adds to the states, to close the gap again; zeros elsewhere
     answer: Column  # derivative of x by the rates without rows, for the forces of links
     sets: tuple[tuple[sp.Symbol, sp.Expr], ...] = ()
+    in_order: bool = False
 
     @property
     def gap(self) -> sp.Expr:
@@ -224,7 +226,7 @@ def rows_of(
             lift[places[coordinate]] = inside[a][places[speed]]
         rows.append(
             Row(surface.law, modes[a], surface.level, levels[a], biases[a], gradients[a], tuple(inside[a]), stiffness[a],
-                surface.ratio, x[a], tuple(lift), answers[a])
+                surface.ratio, x[a], tuple(lift), answers[a], in_order=surface.in_order)
         )  # fmt: skip
     return tuple(rows)
 

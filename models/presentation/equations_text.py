@@ -123,7 +123,8 @@ def _events(rows: Sequence[Row | Surface], style: Style) -> Iterator[str]:
     for row in rows:
         if row.law is Law.STOP:
             gap, times = style.words("stop at the gap "), style.words(": its rate is reversed times ")
-            yield f"{gap}{writer.write(row.level)}{times}{writer.write(row.ratio)}"
+            turn = style.words(", in order with others hit at once") if row.in_order else ""
+            yield f"{gap}{writer.write(row.level)}{times}{writer.write(row.ratio)}{turn}"
         elif row.law is Law.RESET:
             jumps = ", ".join(f"{writer.write(s)} := {writer.write(e)}" for s, e in row.sets)
             yield f"{jumps}{style.words(' where this passes 0 upwards: ')}{writer.write(row.level)}"

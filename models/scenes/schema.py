@@ -171,7 +171,7 @@ def _written_out() -> tuple[Table, Table, Table]:
     friction = {"anyOf": [*law["anyOf"], table]}
     events = [
         _table({"friction": NUMBER, "load": NUMBER, "law": friction}, "friction"),
-        _table({"stop": NUMBER, "restitution": NUMBER}, "stop"),
+        _table({"stop": NUMBER, "restitution": NUMBER, "in_order": {"type": "boolean"}}, "stop"),
         _table({"reset": NUMBER, "sets": EXPRESSIONS}, "reset", "sets"),
     ]
     common = {"name": TEXT, "source": CITATION, "parameters": anything, "initial": anything,

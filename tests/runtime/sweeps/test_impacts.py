@@ -172,6 +172,7 @@ def test_the_error_of_clocks_that_reset_one_after_the_other(integrator: str) -> 
     ("make", "message"),
     [
         (lambda: sc.Stop(Y, 1.5), "found the restitution 3/2; expected a number from 0 to 1"),
+        (lambda: sc.Stop(Y, in_order="yes"), "found in_order = 'yes'; expected True or False"),
         (lambda: sc.Stop(V), r"found the gap v; expected a function of coordinates and time"),
         (
             lambda: sc.Reset(Y - 1, {Y: 2}),

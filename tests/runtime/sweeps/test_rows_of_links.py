@@ -174,6 +174,80 @@ def test_impacts_at_one_instant_that_feel_each_other_are_ambiguous(integrator: s
     assert end(both.replace(initial={"x": [0, 1, 2.1], "v": [1, 0, -1]}))["v"].sum() == pytest.approx(0.0, abs=1e-12)
 
 
+def one_after_another(v: list[float], e: float) -> list[float]:
+    """Impacts of neighbours of mass 1 in turn, from the first pair to the last, until none approach."""
+    v, approaching = [float(each) for each in v], True
+    while approaching:
+        approaching = False
+        for k in range(len(v) - 1):
+            if (speed := v[k] - v[k + 1]) > 1e-14:
+                middle, approaching = (v[k] + v[k + 1]) / 2, True
+                v[k : k + 2] = middle - e * speed / 2, middle + e * speed / 2
+    return v
+
+
+IN_ORDER = sc.Potential(0, {E: 1}, events=[sc.Stop("x_j - x_i - 1", restitution=E, in_order=True)])
+
+
+@pytest.mark.parametrize("integrator", [*METHODS, "rodas5p"])
+@pytest.mark.parametrize(
+    ("e", "speeds"),
+    [
+        (1, [1, 0, 0, 0, 0]),  # the last ball leaves with the speed of the first
+        (0.9, [1, 0, 0]),
+        (0.3, [1, 0, 0, -0.4]),
+        (0, [1, 0, 0, 0]),  # plastic: all move on together
+    ],
+)
+def test_balls_in_touch_rebound_one_after_another(e: float, speeds: list[float], integrator: str) -> None:
+    """Balls at rest in touch, hit by the first, and at the same time by the last."""
+    places = [-0.5, *range(1, len(speeds))]
+    places[-1] -= speeds[-1] * 0.5
+    touching = scene(
+        BLOCK,
+        IN_ORDER,
+        sc.graphs.chain(len(speeds)),
+        1.5,
+        integrator,
+        parameters={"e": e},
+        initial={"x": places, "v": [float(v) for v in speeds]},
+    )
+    assert end(touching)["v"] == pytest.approx(one_after_another(speeds, e), abs=1e-12)
+
+
+def test_stops_in_order_are_read_and_shown(tmp_path: Path) -> None:
+    """Stops of a node too: a corner whose walls are not at right angles."""
+    given = scene(BLOCK, IN_ORDER, sc.graphs.chain(3), 1.0, "auto", initial={"x": [0, 1, 2]})
+    given.save(tmp_path / "cradle.toml")
+    assert "in_order = true" in (tmp_path / "cradle.toml").read_text(encoding="utf-8")
+    assert load_scene(tmp_path / "cradle.toml").equations.digest == given.equations.digest
+    assert "in order" in sc.export.text(given.equations)
+    assert "in order" not in sc.export.text(given.replace(coupling=CRADLE).equations)
+    y, u = sp.symbols("y u")
+    walls = [sc.Stop(Y_GAP, restitution=1, in_order=True) for Y_GAP in (y, X - y)]
+    corner = sc.Lagrangian((V**2 + u**2) / 2, 0, coordinates={X: V, y: u}, events=walls)
+    # by hand: reversed at y = 0, reflected at x = y: (v, u) -> (v, -u) -> (-u, v), and the same again
+    falls = scene(
+        corner, None, sc.graphs.chain(1), 2.0, "taylor", initial={"x": [2.0], "y": [1.0], "v": [-2.0], "u": [-1.0]}
+    )
+    assert end(falls)["v"][0] == pytest.approx(2.0, abs=1e-12)
+    assert end(falls)["u"][0] == pytest.approx(1.0, abs=1e-12)
+    with pytest.raises(ValueError, match="found stops with in_order = True; expected False"):
+        sc.export.to_c(falls.equations)
+
+
+@pytest.mark.parametrize(("length", "time"), [(1.0, 1.0), (1e-9, 1e6), (1e6, 1e-3)])
+def test_a_sticking_block_that_is_hit_slips_in_any_unit(length: float, time: float) -> None:
+    """Blocks on the ground, friction coefficient 1/10: the first hits the second at v^2 = 1 - 2/10, e = 9/10."""
+    law = sc.friction_law("sign(w)")
+    block = sc.Lagrangian(V**2 / 2, 0, {X: N * sc.friction(-V)}, coordinates={X: V}, parameters={N: length / time**2 / 10},
+                          friction=law, contact="set-valued")  # fmt: skip
+    pair = scene(block, CRADLE, sc.graphs.chain(2), 20 * time, "taylor", atol=1e-13 * length,
+                 initial={"x": [0, length], "v": [length / time, 0]})  # fmt: skip
+    ways = np.array([0.05, 0.95]) ** 2 * 0.8 / 0.2
+    assert end(pair)["x"] / length - 1 == pytest.approx(ways, rel=1e-9)
+
+
 def test_balls_of_different_masses() -> None:
     """e = 1: masses 1, 2, 3 from the parameter of each node; momentum and energy stay."""
     m = sp.Symbol("m")
