@@ -25,7 +25,7 @@ from .spread import spread
 @njit(error_model="numpy", forceinline=True)
 def counts_every_step(dims):
     """Return True if every step of the window is recorded, so that no cycle can be left out."""
-    return dims.sections + dims.observed + dims.sampled > 0
+    return dims.sections + dims.observed + dims.sampled + dims.events > 0
 
 
 @njit(error_model="numpy")

@@ -147,3 +147,15 @@ def test_refusals() -> None:
         scene(ball, 1.0, "taylor", record=("events", "section"))
     with pytest.raises(ValueError, match="the result has no events"):
         _ = sc.run(scene(ball, 1.0, "taylor", record=(), initial={"y": [1.0]}), show_progress=False).events
+
+
+def test_every_event_of_a_motion_that_repeats_itself_is_recorded() -> None:
+    """One impact in each period of the drive; runs without a record of events leap over periods that repeat."""
+    x, v, t = sp.symbols("x v t")
+    hit = sc.Lagrangian(v**2 / 2, x**2 / 2, {x: 0.9 * sp.cos(0.8 * t) - 0.1 * v}, coordinates={x: v},
+                        events=[sc.Stop(0.6 - x, 0.7)])  # fmt: skip
+    given = sc.Scene(hit, topology=sc.graphs.chain(1), record=["events"], transient=300, window=400, initial={"x": 0.1})
+    found = sc.run(given, workers=1, show_progress=False)
+    assert int(found.event_count) == int(found.event_impacts.sum()) == 400
+    times = found.events.event_time.values.ravel()
+    assert np.diff(times) == pytest.approx(2 * np.pi / 0.8, rel=1e-9)
