@@ -11,6 +11,8 @@ LOOPED = False
 """True if the step loops over nodes and links; it then takes their arrays."""
 CONTACTS = False
 """True if oscillators stick and slip: their third state is the mode, which events change."""
+ROWS = False
+"""True if these contacts are rows (models/mechanics/rows.py)."""
 SERIES = False
 """True if the step is a Taylor step: it tells how long it is and how far its series reach, which are its dense output."""
 LANES = 1

@@ -59,8 +59,6 @@ class ModeDimensions(NamedTuple):
     """Numbers that differ from mode to mode."""
     shared: int
     """Length of the array in which a step of the orbit leaves what the modes need."""
-    jumps: int
-    """1 if slip begins with a jump of acceleration, else 0."""
     rows: int
     """Contacts, or rows of all nodes."""
     felt: int

@@ -97,11 +97,11 @@ def refine(nodes, legs):
 
 
 @njit(error_model="numpy")
-def begin_leg(modes, powers, registers, left):
+def begin_leg(modes, powers, registers):
     """Let the deviation of every node be 1 in the component that a landing leaves."""
     for register in range(registers):
-        store(modes, 2 * register + left, broadcast(1.0, LANES))
-        store(modes, 2 * register + 1 - left, broadcast(0.0, LANES))
+        store(modes, 2 * register, broadcast(1.0, LANES))
+        store(modes, 2 * register + 1, broadcast(0.0, LANES))
         store(powers, register, broadcast(0.0, LANES))
 
 
@@ -109,7 +109,7 @@ def begin_leg(modes, powers, registers, left):
 def begin_products(travellers, legs):
     """Let the products of legs begin at a landing, which has left one component of all deviations."""
     for s in range(travellers.groups):
-        store(travellers.kept, s, load(travellers.moved, 2 * s + legs.left, LANES))
+        store(travellers.kept, s, load(travellers.moved, 2 * s, LANES))
     copy(travellers.lifts, travellers.groups, travellers.kept_powers)
     renew_products(travellers, legs)
 
@@ -150,9 +150,8 @@ def land(nodes, legs):
 
     The powers of two of each leg are counted, so that the products stay within range.
     """
-    factors = address(nodes.table, legs.left * nodes.stride)
-    worst = largest_misfit(legs.panels, legs.weights, factors, nodes.exponents, 1, 1, 1, nodes.stride)
-    multiply_all(legs.panels, legs.weights, factors, nodes.exponents, legs.share, legs.share_powers)
+    worst = largest_misfit(legs.panels, legs.weights, nodes.table, nodes.exponents, 1, 1, 1, nodes.stride)
+    multiply_all(legs.panels, legs.weights, nodes.table, nodes.exponents, legs.share, legs.share_powers)
     return worst
 
 

@@ -16,9 +16,9 @@ from ..simd.addresses import address
 from ..simd.lanes import any_lane, broadcast, lane_bits, load, maximum, minimum, select, store
 from .cells import aligned, begin, fill, lane_room, outcome, put, restart, turn_over, watch
 from .clock_slots import *
-from .contact_modes import begin_contacts, pass_events
 from .control import accept_series, advance, aim, arrive, judge, pause, wrap
 from .dense import inside
+from .event_modes import begin_events_of_modes, pass_events
 from .frames import GONE, LENGTHS, NEXT, PARTS, PRODUCTS, SHIFT, VOLUMES, close_block, drain, orthogonalise
 from .landings import begin_leg, begin_products, bring, close_batch, hand_over, land, lay_out
 from .passages import note_rush, take_back
@@ -117,11 +117,11 @@ def renew(cell, spans, control, clock):
 @njit(error_model="numpy")
 def begin_deviations(cell, old, modes, orbit, dims, functions):
     """Let the deviations of a cell begin; return True if a contact sticks, which takes their velocities at once."""
-    take_in(modes.vectors[cell], old, modes.registers, modes.owners.size)
+    take_in(modes.vectors[cell], old, modes.registers, modes.parts)
     for k in range(modes.registers * LANES):
         modes.powers[k] = 0.0
     if CONTACTS:
-        return begin_contacts(old, modes, orbit, dims, functions)
+        return begin_events_of_modes(old, modes, orbit, dims, functions)
     return False
 
 
@@ -139,7 +139,7 @@ def cut_leg(carried, modes, nodes, panels, travellers, legs):
     if landed:
         if not parted:
             begin_products(travellers, legs)
-        begin_leg(old, modes.powers, modes.node_registers, legs.left)
+        begin_leg(old, modes.powers, modes.node_registers)
         parted = True
     return error, Carried(old, new, fresh, parted, False, cut_at)
 
@@ -159,9 +159,9 @@ def take_step(taken, carried, modes, orbit, dims, functions):
         old, new = new, old
         taken += 1
         if taken % BETWEEN_SCALINGS == 0:
-            scale(old, modes.powers, active, modes.owners.size)
+            scale(old, modes.powers, active, modes.parts)
             if modes.framed:
-                drop(old, modes.powers, active, modes.owners.size)
+                drop(old, modes.powers, active, modes.parts)
     largest = advance(clock, y, t, t_new, accept, orbit.y_new, dims)
     if CONTACTS:
         landed = pass_events(accept, t_new, strengths, old, active, modes, orbit, dims, functions) or landed
@@ -231,11 +231,10 @@ def load_strengths(strengths, places, modes, kinds):
 
 
 @njit(error_model="numpy", nogil=True, cache=True)
-def march(functions, dims, owners, first, last, inputs, deviations, outputs, propagation, framing):
+def march(functions, dims, first, last, inputs, deviations, outputs, propagation, framing):
     """Run the cells first … last-1, each an orbit with all modes.
 
-    functions: those of a scene.  dims: the sizes of its arrays.  owners (mode): the contact that each component of a
-    deviation is a velocity of, -1 for the others.
+    functions: those of a scene.  dims: the sizes of its arrays.
 
     inputs: start, values, spans, control as in a sweep.  outputs: end, sums, counts as in a sweep.
 
@@ -275,13 +274,13 @@ def march(functions, dims, owners, first, last, inputs, deviations, outputs, pro
     middle, dense = address(y_new, size), address(y_new, 2 * size)
     out = address(dense, dense_size)
     shared = address(out, contact_size)
-    slips = address(shared, dims.shared)
+    before = address(shared, dims.shared)
     impacts = address(y, lane_room(dims) - 2 * dims.rows)
     friction = EventWorkspace(middle, out, clock, address(control, 0), (), dims, functions, impacts)
-    orbit = Orbit(clock, y, y_new, dense, shared, slips, address(control, 0), friction)
+    orbit = Orbit(clock, y, y_new, dense, shared, before, address(before, size), address(control, 0), friction)
 
     # 2. Workspace of the deviations, in registers.
-    registers, parts, columns = growth.shape[1] // LANES, owners.size, places.shape[1]
+    registers, parts, columns = growth.shape[1] // LANES, vectors.shape[1], places.shape[1]
     stride, groups = registers * LANES, 0 if plan.size else gains.shape[2] // LANES
     sticks, room = leg_rows.shape[0] > 0, int(leg_rows[leg_rows.shape[0] - 1, TO]) * LANES if leg_rows.shape[0] else 0
     held = registers * (2 * parts + 2 + 2 * max(1, kinds) + columns * parts) + 3 * groups
@@ -299,11 +298,11 @@ def march(functions, dims, owners, first, last, inputs, deviations, outputs, pro
     share_powers, fine = address(share, room), address(share, 2 * room)
     heights, work = address(share, 6 * room), address(share, 7 * room)
     count = places.shape[0]
-    few, left = (count + LANES - 1) // LANES, 1 if owners[0] >= 0 else 0
+    few = (count + LANES - 1) // LANES
     tolerance = control[RTOL] * control[LOOSENESS]
-    modes = Modes(vectors, owners, tolerance, plan.size > 0, registers, few, powers, mode_strengths, node_strengths)
+    modes = Modes(vectors, parts, tolerance, plan.size > 0, registers, few, powers, mode_strengths, node_strengths)
     nodes = Propagators(table, exponents, stride, address(places, 0), count, columns, parts)
-    legs = Legs(leg_rows, address(shares, 0), where, left, share, share_powers, fine, heights, work)
+    legs = Legs(leg_rows, address(shares, 0), where, share, share_powers, fine, heights, work)
     load_strengths(strengths, places, modes, kinds)
 
     for cell in range(first, last):

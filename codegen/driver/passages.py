@@ -16,7 +16,7 @@ from numba import njit
 
 from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, minimum, select, store
 from .clock_slots import ACCEPTED, N_POINTS, REJECTED, RUSH, STEP, STOP, UNTIL, WIDTH
-from .contacts import clear_scales, gap_inside, gap_of, grown_scale, push, scale_of
+from .gaps import clear_scales, gap_inside, gap_of, grown_scale, push, scale_of
 
 # --- kernel text below ---
 # A gap that is less than this part of its scale below zero counts as zero; a passage is never sought closer than the shortest step to it.

@@ -82,7 +82,8 @@ class Orbit(NamedTuple):
     y_new: Any
     dense: Any
     shared: Any  # Jacobians of a step, or their series, for the modes
-    slips: Any  # modes of the contacts before an event; of rows, the state, and 1 for a closed gap
+    before: Any  # the state before an event
+    changed: Any  # 1 for each contact or row that changes at the event
     control: Any
     friction: EventWorkspace
 
@@ -95,7 +96,7 @@ class Modes(NamedTuple):
     """
 
     vectors: Any  # (cells, parts, modes)
-    owners: Any  # (parts): contact that a component is a velocity of, or -1
+    parts: Any  # components of a deviation
     tolerance: Any
     framed: Any  # True if deviations are made orthogonal after each block
     registers: Any
@@ -152,7 +153,6 @@ class Legs(NamedTuple):
     panels: Any
     weights: Any
     where: Any  # (nodes of panels): their places in registers
-    left: Any  # component that a landing leaves
     share: Any  # addresses from here: products of the factors of legs, and their powers of two
     share_powers: Any
     fine: Any  # the same in the order of the nodes of panels

@@ -1,4 +1,4 @@
-"""Rows (models/mechanics/rows.py): their gaps, and which of them are held after an event.
+"""Which rows (models/mechanics/rows.py) are held after an event.
 
 A node below is any group of rows that are solved together: those of one node, or of the nodes that links join.
 An event of a node has two parts.  Guards reset states and stops rebound: speeds jump.  Then all rows on their surfaces
@@ -21,14 +21,12 @@ import math
 import numpy as np
 from numba import njit
 
-from ..simd.lanes import any_lane, broadcast, lane_bits, load, maximum, minimum, store
+from ..simd.lanes import any_lane, broadcast, lane_bits, store
 from .cells import put
 from .clock_slots import *
-from .dense import inside
+from .gaps import GAP, LAW, LEVEL, MODE, NUMBER, RATE, RATIO, SPEED, K, clear_scales, place, push, smallest_gap
 
 # --- kernel text below ---
-# Groups of `pushes` and `strike`: six in front of the looks, the others behind the numbers on jumps in time.
-LEVEL, GAP, MODE, SPEED, RATE, RATIO, LAW, NUMBER, SIZE, K = 0, 1, 2, 3, 4, 5, 9, 10, 11, 12
 OF_SIGN, OF_STOP, OF_RESET, OF_STOP_IN_ORDER = 0.0, 1.0, 2.0, 3.0
 # What an event means for a row: nothing, its mode is known, it is decided, it lets go to the side of its force.
 UNTOUCHED, KNOWN, OPEN, RELEASED = 0.0, 1.0, 2.0, 3.0
@@ -38,74 +36,10 @@ ROLE, BEFORE, SPEED_BEFORE, X, SHUT, FELT = 0, 1, 2, 3, 4, 5
 NOTES = 6
 # A pivot, or a change of a speed, this much smaller than what it is the difference of is zero.
 NONE = 1e-12
-# The part of the terms of a gap with which it is compared: PASSED (passages.py) of it are 7 rounding errors of the terms.
-PART = 1.0 / 64.0
 # Height of the last rebound of a stop over that of the first ones (a choice).
 LOWEST = 1e-12
 # Most passes over stops that rebound in order (a choice).
 PASSES = 10000
-
-
-@njit(error_model="numpy", forceinline=True)
-def gap_of(i, p, out, dims):
-    """Return the gap of one row from the output of `pushes`."""
-    return load(out, dims.rows + i, WIDTH)
-
-
-@njit(error_model="numpy", forceinline=True)
-def push(t, y, p, friction):
-    """Compute the numbers of all rows at a state."""
-    if LOOPED:
-        graph, weights = friction.network
-        friction.functions.pushes(t, y, p, friction.out, graph, weights)
-    else:
-        friction.functions.pushes(t, y, p, friction.out)
-
-
-@njit(error_model="numpy", forceinline=True)
-def scale_of(i, out, dims):
-    """Return the scale of a gap."""
-    return load(out, place(K + dims.felt + 3, i, dims), WIDTH)
-
-
-@njit(error_model="numpy", forceinline=True)
-def grown_scale(i, out, dims):
-    """Return the scale of a gap at a look, which is at least a part of the terms of the gap, and store it."""
-    scale = maximum(scale_of(i, out, dims), PART * load(out, place(SIZE, i, dims), WIDTH))
-    store(out, place(K + dims.felt + 3, i, dims), scale)
-    return scale
-
-
-@njit(error_model="numpy", forceinline=True)
-def clear_scales(friction):
-    """Let the scales of gaps begin anew in a step."""
-    for i in range(friction.dims.rows):
-        store(friction.out, place(K + friction.dims.felt + 3, i, friction.dims), broadcast(1e-300, WIDTH))
-
-
-@njit(error_model="numpy", forceinline=True)
-def smallest_gap(t, y, p, friction):
-    """Return the smallest gap of all rows at a state, each in parts of its scale."""
-    push(t, y, p, friction)
-    least = broadcast(1e300, WIDTH)
-    for i in range(friction.dims.rows):
-        gap = gap_of(i, p, friction.out, friction.dims)
-        least = minimum(least, gap / scale_of(i, friction.out, friction.dims))
-    return least
-
-
-@njit(error_model="numpy")
-def gap_inside(theta, step, friction):
-    """Return the smallest gap at a fraction of the step."""
-    for c in range(friction.dims.dimension):
-        store(friction.middle, c, inside(theta, c, step.y, step.y_new, step.dense, friction.dims))
-    return smallest_gap(step.t + theta * step.h, friction.middle, step.y, friction)
-
-
-@njit(error_model="numpy", forceinline=True)
-def place(group, row, dims):
-    """Return the place of a number of a row."""
-    return group * dims.rows + row + (2 if group >= 9 else 0)
 
 
 @njit(error_model="numpy", forceinline=True)

@@ -82,7 +82,7 @@ class Driver:
     def functions(self) -> tuple[str, ...]:
         """Functions of the scene and recorders, in the order of the driver's arguments."""
         if self.kind is KernelKind.MODES:
-            return "step", "carry", "pushes", *(("strike", "saltate") if self.rows else ("release",))
+            return "step", "carry", "pushes", *["strike"] * self.rows, "saltate"
         return "step", "pushes", *["strike"] * self.rows, "section", "values", *RECORDERS
 
     def recorder(self, entry: str) -> Recorder:
@@ -105,12 +105,12 @@ class Driver:
             "WIDTH": 1 if modes else self.width,
             **({"LANES": self.width} if modes else {}),
             "CONTACTS": self.contacts,
+            **({"ROWS": self.rows} if self.contacts else {}),
             "LOOPED": self.looped,
             "SERIES": self.series,
         }
-        of_contacts = ["rows" if self.rows else "contacts", "passages"]
-        of_modes = "row_modes" if self.rows else "contact_modes"
-        contacts, landings = (of_contacts, ["landings", of_modes]) if self.contacts else ([], [])
+        of_contacts = ["gaps", "rows" if self.rows else "contacts", "passages"]
+        contacts, landings = (of_contacts, ["landings", "event_modes"]) if self.contacts else ([], [])
         frames = ["frames", "lifted_frames"] if self.kind is KernelKind.FRAME else []
         last = ["propagators", *landings, "frames", "modes"] if modes else ["spread", "sweep", *frames]
         pieces = (f"driver.{name}" for name in ("dense", "cells", "control", *contacts, *last))

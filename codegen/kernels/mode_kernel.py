@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
 import sympy as sp
 
 from synchain.models.dynamics.variational import Variation
@@ -28,9 +27,8 @@ from ..program.printers import LANES
 from ..program.statements import Assign, Comment, Function, Return, Role, Statement, let, operations, store
 from ..simd import lanes
 from ..steps.blocks import analyse
-from ..steps.contact_step import event_functions, register
 from ..steps.elimination import plan, write_factors, write_solve
-from ..steps.row_step import contact_groups, most_rows, row_count, row_events
+from ..steps.row_step import contact_groups, event_functions, most_rows, register, row_count
 from ..steps.step import StepWriter, node_function, scaling
 from ..steps.unrolled_step import UnrolledStep, stage_state
 from ..taylor import write_tangent
@@ -66,8 +64,6 @@ class ModeKernel(KernelSource):
     """A kernel that carries the deviations of modes along orbits."""
 
     dimensions: ModeDimensions = field(repr=False)
-    # for each component of a deviation, the contact whose velocity it is; -1 if none
-    owners: tuple[int, ...] = field(repr=False)
 
     @property
     def functions(self) -> tuple[str, ...]:
@@ -75,7 +71,7 @@ class ModeKernel(KernelSource):
 
     @property
     def arguments(self) -> tuple[Any, ...]:
-        return self.dimensions, np.array(self.owners, np.int64)
+        return (self.dimensions,)
 
 
 def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int | None = None) -> ModeKernel:
@@ -104,13 +100,11 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
     else:
         workspace = 0
         functions, shared, count = _stages(variation, method, names)
-    rows = events is not None and plain.has_rows
-    of_events = row_events(variation, events, names) if events and rows else event_functions(variation, names)
     deviations = f"{variation.size} deviations, {width} modes a register"
     constants = {"WIDTH": 1, "LANES": width, "DENSE": plain.sticks or method.series}
     return ModeKernel(
         describe(named, method, (), count, deviations),
-        module(constants, functions, of_events),
+        module(constants, functions, event_functions(variation, names)),
         equations,
         method,
         Driver(KernelKind.MODES, width, contacts=plain.sticks, series=method.series, rows=plain.has_rows),
@@ -124,12 +118,10 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
             repeats=0,
             strengths=len(variation.parameters),
             shared=shared,
-            jumps=int(events is not None and bool(events.exits)),
             rows=row_count(plain),
-            felt=most_rows(plain) if rows else 0,
+            felt=most_rows(plain) if plain.has_rows else 0,
             contacts=contact_groups(plain),
         ),
-        (-1,) * variation.size if events is None else tuple(events.owners),
     )
 
 

@@ -88,14 +88,12 @@ def _of_modes(driver: Driver) -> tuple[dict[str, Any], tuple[Any, ...], tuple[An
         "step": result(*times, *[ADDRESS] * 4, NUMBER, NUMBER, ADDRESS),  # as above, and Jacobians for `carry`
         "carry": NUMBER(*[ADDRESS] * 4, *registers, NUMBER),  # Jacobians, strengths, old, new; registers; tolerance
         "pushes": types.void(one, *[ADDRESS] * 3),
-        # node, state of the contact, t; y, strengths, deviations; register
-        "release": types.void(INTEGER, NUMBER, NUMBER, *[ADDRESS] * 3, INTEGER),
         "strike": types.void(one, *[ADDRESS] * 3),
-        # row, t; y before and after, strengths, deviations; register
+        # contact or row, t; y before and after, strengths, deviations; register
         "saltate": types.void(INTEGER, NUMBER, *[ADDRESS] * 4, INTEGER),
     }
     deviations, outputs = (READ_ONLY, CUBE, MATRIX), (MATRIX, MATRIX, COUNTS)
     # batches, places, panels, weights, travellers, gains, misfits; legs, shares, where; tracks
     propagation = (CELLS, MATRIX, MATRIX, VECTOR, MATRIX, CUBE, VECTOR, MATRIX, VECTOR, VECTOR, CUBE)
     framing = (CELLS, MATRIX)  # plan, frame
-    return taken, (_sizes(ModeDimensions), CELLS), (deviations, outputs, propagation, framing)
+    return taken, (_sizes(ModeDimensions),), (deviations, outputs, propagation, framing)

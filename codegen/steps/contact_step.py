@@ -7,7 +7,6 @@
 
 The driver stores three more groups behind these six. If a function of time has jumps or kinks, two numbers follow. Both
 change value when time passes a jump or kink: the first is evaluated at the time t, the second a shortest step later.
-`release` corrects the velocities of deviations where a contact changes from stick to slip.
 """
 
 from __future__ import annotations
@@ -18,15 +17,13 @@ import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import gaps
-from synchain.models.dynamics.saltation import Events
-from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.mechanics.events import Event
 
-from ..program.expressions import ZERO, Compare, Expression, Load, Name, Number, ProductExpr, call, plus
+from ..program.expressions import Load, Name, Number
 from ..program.lowering import lower
 from ..program.passes import Hoist, Names, real, share
-from ..program.statements import Assign, Function, If, Role, Statement, accumulate, let, store
+from ..program.statements import Assign, Function, Role, Statement, accumulate, let, store
 from .blocks import assigned
 from .places import StateLayout, link_ends, named, span
 from .safe_names import NAMES
@@ -126,47 +123,3 @@ def _force(equations: Equations, places: StateLayout, event: Event) -> tuple[lis
 def parameter_loads(equations: Equations, used: set[sp.Symbol]) -> list[Statement]:
     first = equations.dimension
     return [let(p, Load("p", Number(first + k))) for k, p in enumerate(equations.parameters) if real(p) in used]
-
-
-# -- deviations -----------------------------------------------------------------------------------------------
-
-
-def event_functions(variation: Variation, names: Names) -> list[Function]:
-    """Return the functions for the events of set-valued friction in a kernel that carries deviations."""
-    if variation.events is None:
-        return []
-    return [*push_functions(variation.orbit, names), _release(variation.events, variation, names)]
-
-
-def _release(events: Events, variation: Variation, names: Names) -> Function:
-    """Write the function `release`, which sets the velocities of the deviations in one register."""
-    equations, size, strengths = variation.orbit, variation.size, [s.name for s in variation.parameters]
-    used = set().union(*(e.free_symbols for e in events.expressions))
-    # the numbers of the one orbit fill a register; strengths differ from lane to lane
-    body: list[Statement] = [
-        let(name, call("broadcast", Load("y", Number(k), None), "LANES"))
-        for k, name in enumerate((*equations.state, *equations.parameters))
-        if real(name) in used
-    ]
-    loads = ((s, register("strengths", len(strengths), k)) for k, s in enumerate(strengths))
-    body += [let(s, load) for s, load in loads if real(s) in used]
-    for i, sides in enumerate(events.exits):
-        after = []
-        for sign, entries in zip("><", sides, strict=True):
-            gained = share([e for _, e in entries], names.fresh("z"))
-            # row = sum over columns of entry*deviation
-            rows: dict[int, list[Expression]] = {}
-            for ((row, column), _), e in zip(entries, gained.results, strict=True):
-                rows.setdefault(row, []).append(ProductExpr((lower(e), register("modes", size, column))))
-            stores = [store("modes", size * Name("which") + row, plus(*terms)) for row, terms in rows.items()]
-            after.append(If(Compare(sign, Name("after"), ZERO), (*assigned(gained), *stores)))
-        body.append(If(Compare("==", Name("i"), Number(i)), tuple(after)))
-    about = "Where a contact begins to slip and friction drops at once, deviations that let go early have gained a velocity."
-    return Function(
-        "release", ("i", "after", "t", "y", "strengths", "modes", "which"), about, tuple(body), role=Role.ENTRY
-    )
-
-
-def register(array: str, size: int, k: int) -> Load:
-    """Load register k of a group of modes; each group fills `size` registers of the array."""
-    return Load(array, size * Name("which") + k, "LANES")

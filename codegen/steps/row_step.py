@@ -22,7 +22,6 @@ from itertools import islice
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.saltation import Events
 from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import Edge, Node
 from synchain.models.mechanics.rows import Law, Row, forces, struck, term_size
@@ -32,7 +31,7 @@ from ..program.lowering import lower
 from ..program.passes import Names, StraightLine, real, share
 from ..program.statements import Assign, Function, If, Role, Statement, accumulate, let, store
 from .blocks import assigned
-from .contact_step import SIDES, jump_sides, parameter_loads, register, time_gaps
+from .contact_step import SIDES, jump_sides, parameter_loads, push_functions, time_gaps
 from .places import Joint, Span, StateLayout, by_kind, link_ends, named
 from .safe_names import NAMES
 from .step import lane
@@ -74,7 +73,7 @@ def row_count(equations: Equations) -> int:
     return sum(map(len, all_rows(equations)))
 
 
-def row_functions(equations: Equations, names: Names, looped: bool) -> list[Function]:
+def row_functions(equations: Equations, names: Names, looped: bool = False) -> list[Function]:
     """Return the functions `pushes` and `strike`, written out or `looped` over nodes and links."""
     network = ("graph", "weights") if looped else ()
     written = _Looped(equations, names) if looped else _WrittenOut(equations, names)
@@ -87,8 +86,11 @@ def row_functions(equations: Equations, names: Names, looped: bool) -> list[Func
     ]
 
 
-def row_events(variation: Variation, events: Events, names: Names) -> list[Function]:
-    """Return the functions of a kernel that carries deviations: those of the orbit, and `saltate` for one register."""
+def event_functions(variation: Variation, names: Names) -> list[Function]:
+    """Return the functions of the events of the orbit, and `saltate`, which changes the deviations in one register."""
+    events = variation.events
+    if events is None:
+        return []
     orbit, size, strengths = variation.orbit, variation.size, [s.name for s in variation.parameters]
     used = set().union(*(e.free_symbols for e in events.expressions))
     loads = [(name, "before", k) for k, name in enumerate(orbit.state)]
@@ -109,10 +111,15 @@ def row_events(variation: Variation, events: Events, names: Names) -> list[Funct
         line = share([jump[c] for c in moved], names.fresh("z"))
         stores = [store("modes", size * Name("which") + c, lower(e)) for c, e in zip(moved, line.results, strict=True)]
         body.append(If(Compare("==", Name("row"), Number(number)), (*assigned(line), *stores)))
-    about = "Change deviations by an event of a row; behind the last row: by a start on surfaces."
+    about = "Change deviations by an event of a contact or row; behind the last one: by a start with held ones."
     arguments = ("row", "now", "before", "after", "strengths", "modes", "which")
     saltate = Function("saltate", arguments, about, tuple(body), role=Role.ENTRY)
-    return [*row_functions(orbit, names, looped=False), saltate]
+    return [*(row_functions if orbit.has_rows else push_functions)(orbit, names), saltate]
+
+
+def register(array: str, size: int, k: int) -> Load:
+    """Load register k of a group of modes; each group fills `size` registers of the array."""
+    return Load(array, size * Name("which") + k, "LANES")
 
 
 def _full(rows: Sequence[Row], row: Row) -> list[sp.Expr]:

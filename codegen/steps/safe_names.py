@@ -30,7 +30,7 @@ RESERVED = frozenset(
      "bank", "estimate", "step", "section", "theta", "now",
      "njit", "p", "drive", "scaled", "inside", "total", "e3", "e5", "np", "math",
      "WIDTH", "DENSE", "LANES", "MODE_SIZE", "STRENGTHS", "SHARED", "shared", "steady", "moving", "bent", "lag",
-     "strengths", "which", "mode_step", "march", "pushes", "out", "network", "release",
+     "strengths", "which", "mode_step", "march", "pushes", "out", "network", "saltate", "row", "before",
      "after", "modes", "dims", "slope", "values", "strike"}
     | set(NAMES)
     | set(keyword.kwlist) | set(dir(builtins)) | set(elementary.__all__) | set(lanes.__all__) | set(special.__all__)

@@ -23,7 +23,7 @@ from ..symmetries.irreducible import plus
 from .equations import Equations
 from .mode_inertia import effective_slope
 from .reduction import by_class, collapse
-from .saltation import Entry, Events, of_mode, of_network, of_slots
+from .saltation import Events, of_mode, of_network, of_slots
 from .synchrony import expect_no_friction_in_links, synchronous_node
 
 if TYPE_CHECKING:
@@ -41,6 +41,9 @@ PHASE = sp.Symbol("phase", real=True)
 
 LOG_VOLUME = sp.Symbol("log_volume", real=True)
 """Integral of the divergence of one oscillator; summed over all oscillators: logarithm of a phase-space volume."""
+
+Entry = tuple[tuple[int, int], sp.Expr]
+"""((row, column), expression) of a matrix."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +184,7 @@ def mode(equations: Equations, plane: bool = False, by_weight: bool = False, siz
         sp.BlockMatrix([[jacobian * int(k == j) - links[k][j] for j in range(count)] for k in range(count)])
     )
     free = dict.fromkeys(orbit.symbols(0)[components:], sp.S.One)
-    events = of_mode(equations, orbit, slopes, strengths, [[link.xreplace(free) for link in row] for row in links])
+    events = of_mode(equations, orbit, [[link.xreplace(free) for link in row] for row in links])
     return Variation(orbit, count * components, _entries(matrix), tuple(alphas), events)
 
 
