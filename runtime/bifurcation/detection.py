@@ -13,6 +13,7 @@ there: the branch is born in a pitchfork.
 | the parameter turns, a value touches zero | branch point (the branch is born in a pitchfork) |
 | a pair passes | Hopf, torus |
 | a multiplier passes -1 | period doubling |
+| no number; a growth touches zero, or two exchange their signs | branch point, Hopf, torus |
 
 Source: Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed. (Springer, 2004), section 10.2.
 """
@@ -24,7 +25,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from .arclength import ANGLE, Point, Test, correct
 from .kinds import BifurcationKind
@@ -38,6 +39,9 @@ TOUCHING = 1e-5
 # Distance from a turn, relative to the step, at which the value that passes or touches zero is compared: the first at
 # which it differs from zero by CLEAR, relative to the largest value (choices).
 BESIDE, CLEAR = (1e-3, 5e-3, 0.025), 1e-7
+# Growth where one touches zero, relative to that at the ends of the step (a choice): the square of a distance, or two
+# of them, are least where they are known to half of the digits.
+TOUCHED = 1e-6
 SHORT = 1e-3  # longest step on which a growth may seem to pass zero without doing so (a choice)
 MOST_HALVINGS = 1000  # most evaluations for a zero: a multiple one takes some hundred (a choice)
 # Solutions of a step from which a branch point is computed, and its largest distance from where it was looked for,
@@ -60,9 +64,8 @@ class Located:
     @property
     def critical(self) -> complex:
         """The value that passes; real if its imaginary part is a rounding error."""
-        critical = critical_of(self.point)
-        value = complex(critical.values[self.index])
-        return value if abs(value.imag) > REAL * critical.scale else complex(value.real)
+        value = complex(critical_of(self.point).values[self.index])
+        return value if abs(value.imag) > REAL * self.scale else complex(value.real)
 
 
 def critical_of(point: Point) -> GrowthNumbers:
@@ -95,10 +98,10 @@ class BranchStep:
             self.points[distance] = replace(point, critical=critical, length=self.before.length + distance)
         return self.points[distance]
 
-    def scale(self, point: Point) -> float:
-        """Return the size of the critical values; a single value, which is zero at a fold, is measured at both ends."""
-        one = len(critical_of(point).values) == 1
-        return max(critical_of(each).scale for each in ((self.before, self.after) if one else (point,)))
+    @property
+    def scale(self) -> float:
+        """The size of the critical values, at both ends: where all pass together, none is left in between."""
+        return max(critical_of(end).scale for end in (self.before, self.after))
 
     def zero(self, test: Test) -> float:
         """Return the distance at which a function of the solution passes zero."""
@@ -168,25 +171,48 @@ def bifurcations(
     step = BranchStep(problem, before, after, length)
     turned = before.tangent[-1] * after.tangent[-1] < 0.0
     counts = sorted((critical_of(before).growing, critical_of(after).growing))
-    if counts[0] == counts[1] and not turned:
-        return None if _jumped(before, after, length) else []
+    passes = counts[0] != counts[1] or turned
+    nearest = None if passes else _pointing_to_zero(before, length)
     try:
-        return _found(step, range(*counts), turned)
+        if passes:
+            return _found(step, range(*counts), turned)
+        # The step may have passed a branch point onto the other branch, or values that exchange their signs.
+        return [] if nearest is None else None if length >= SHORT else _touching(step, nearest)
     except ArithmeticError:
         return None
 
 
-def _jumped(before: Point, after: Point, length: float) -> bool:
-    """Return whether a step may have passed a branch point onto the other branch.
+def _pointing_to_zero(before: Point, length: float) -> int | None:
+    """Return the index of the growth that a step, begun as the last one went on, would take through zero; None if none.
 
     A branch that is born in a pitchfork touches zero growth there.  Beyond lies the branch that it was born from, with
     as many growing values.
     """
-    if before.slopes is None or length < SHORT or len(before.slopes) != len(critical_of(after).growth):
-        return False
-    growth = critical_of(before).growth
-    nearest = int(abs(growth).argmin())
-    return bool(growth[nearest] * (growth[nearest] + length * before.slopes[nearest]) < 0.0)
+    critical = critical_of(before)
+    if before.slopes is None or not len(critical.growth):
+        return None
+    nearest = int(np.where(abs(critical.growth) > critical.errors, abs(critical.growth), np.inf).argmin())
+    growth = critical.growth[nearest]
+    return nearest if growth * (growth + length * before.slopes[nearest]) < 0.0 else None
+
+
+def _touching(step: BranchStep, index: int) -> list[tuple[float, object]]:
+    """Return the point of a step at which a growth touches zero, or two exchange their signs, so that no number changes."""
+    ends = [abs(critical_of(end).growth[index]) for end in (step.before, step.after)]
+    search = minimize_scalar(
+        lambda h: abs(critical_of(step.at(float(h))).growth[index]), bounds=(0.0, step.length), method="bounded",
+        options={"xatol": 1e-13 * step.length},
+    )  # fmt: skip
+    critical, distance = critical_of(step.at(float(search.x))), float(search.x)
+    together = abs(critical.growth) <= TOUCHED * max(ends)
+    if not together[index] or min(ends) <= TOUCHED * max(ends):
+        return []
+    pairs = abs(critical.values[together].imag) > REAL * step.scale
+    value = complex(critical.values[index])
+    kind = step.problem.kind(value if pairs.any() else complex(value.real), False)
+    point = replace(step.at(distance), tangent=step.tangent(distance))
+    count = int(np.where(pairs, 0.5, 1.0).sum())
+    return [(distance, Located(kind, point, index, step.scale, count))]
 
 
 def _found(step: BranchStep, indices: range, turned: bool) -> list[tuple[float, object]] | None:
@@ -197,19 +223,18 @@ def _found(step: BranchStep, indices: range, turned: bool) -> list[tuple[float, 
     if turn is not None and not any(each.kind is BifurcationKind.FOLD for _, each in located):
         critical = critical_of(step.at(turn))
         touching = int(abs(critical.growth).argmin())
-        scale = step.scale(step.at(turn))
-        if abs(critical.growth[touching]) > TOUCHING * scale:
+        if abs(critical.growth[touching]) > TOUCHING * step.scale:
             return None  # two changes of the number cancel on this step
         near = [h for h, each in located if abs(h - turn) < TOGETHER * length and not abs(each.critical.imag) > 0.0]
         if not near:
             # Of few eigenvalues of a large network one may pass although the number of growing ones stays the same.
             for beside in BESIDE:
                 sides = [_nearest(step.at(min(max(turn + d * length, 0.0), length))) for d in (-beside, beside)]
-                if min(map(abs, sides)) > CLEAR * scale:
+                if min(map(abs, sides)) > CLEAR * step.scale:
                     break
             kind = problem.kind(complex(critical.values[touching].real), sides[0] * sides[1] < 0.0)
             point = step.at(turn) if kind is BifurcationKind.FOLD else step.singular_point(turn, None)
-            located.append((turn, Located(kind, point, touching, scale)))
+            located.append((turn, Located(kind, point, touching, step.scale)))
     for k, (distance, each) in enumerate(located):
         if each.kind is BifurcationKind.BRANCH_POINT:
             located[k] = distance, replace(each, point=replace(each.point, tangent=step.tangent(distance)))
@@ -235,8 +260,8 @@ def _passing(step: BranchStep, indices: range, turn: float | None) -> Iterator[t
     index, neutral = indices.start, np.zeros(indices.stop, dtype=bool)
     if turn is not None:  # real values that are neutral where the parameter turns
         critical = critical_of(step.at(turn))
-        small = abs(critical.growth) <= TOUCHING * step.scale(step.at(turn))
-        neutral = small & (abs(critical.values.imag) <= REAL * critical.scale)
+        small = abs(critical.growth) <= TOUCHING * step.scale
+        neutral = small & (abs(critical.values.imag) <= REAL * step.scale)
     while index < indices.stop:
         turned = bool(neutral[index])
         # A fold is located better by the turn: its value is a square root of the parameter.
@@ -244,10 +269,9 @@ def _passing(step: BranchStep, indices: range, turn: float | None) -> Iterator[t
         critical = critical_of(step.at(distance))
         passing = step.passing(distance, index)
         value = complex(critical.values[passing])
-        paired = abs(value.imag) > REAL * critical.scale
+        paired = abs(value.imag) > REAL * step.scale
         kind, point = step.problem.kind(value if paired else complex(value.real), turned), step.at(distance)
-        scale = step.scale(point)
         if kind is BifurcationKind.BRANCH_POINT:
             point = step.singular_point(distance, step.growth(index))
-        yield distance, Located(kind, point, passing, scale)
+        yield distance, Located(kind, point, passing, step.scale)
         index += 2 if paired else 1

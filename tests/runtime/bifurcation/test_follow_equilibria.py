@@ -377,3 +377,28 @@ def test_a_conserved_momentum_passes_nowhere() -> None:
     twist = 2 * np.pi * np.arange(5) / 5
     first = sc.equilibrium(sc.Scene(rotor, link, sc.graphs.ring(5), initial={"delta": twist}))
     assert sc.follow(first, "K", to=0.3).bifurcations == ()
+
+
+@pytest.mark.parametrize(
+    ("rates", "kind", "count"),
+    [
+        ({"x": "x*(x**2 - r**2)"}, "branch point", 1),
+        ({"x": "r*x - x**3", "y": "-r*y - y**3"}, "branch point", 2),
+        ({"x": "r*x - y", "y": "x + r*y", "u": "-r*u - 2*v", "v": "2*u - r*v"}, "Hopf", 2),
+    ],
+)
+def test_values_that_change_no_number_of_growing_ones_are_listed(rates: dict[str, str], kind: str, count: int) -> None:
+    """A growth -r^2 touches zero, r and -r exchange their signs (C)."""
+    rest = sc.equilibrium(sc.Scene(sc.Field(rates, parameters={"r": -1})))
+    (point,) = sc.follow(rest, "r", to=1).bifurcations
+    assert (point.kind, point.multiplicity) == (kind, count)
+    assert point.value == pytest.approx(0.0, abs=1e-9)
+
+
+def test_values_that_all_pass_together_are_real() -> None:
+    """Phases that feel sin(q_j - q_i - a) have the Jacobian -cos(a) L (C)."""
+    rates = sc.Rates({"q": "W*sin(q_j - q_i - a)"}, {"a": 0.3})
+    rest = sc.equilibrium(sc.Scene(sc.Field({"q": "w"}, parameters={"w": 1}), rates, sc.graphs.ring(5)))
+    (point,) = sc.follow(rest, "a", to=3).bifurcations
+    assert (point.kind, point.multiplicity) == ("branch point", 4)
+    assert point.value == pytest.approx(np.pi / 2, abs=1e-9)
