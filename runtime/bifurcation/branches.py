@@ -30,7 +30,7 @@ from .kinds import BifurcationKind
 from .located_bifurcation import bifurcation_at
 from .periodic_result import PeriodicOrbit
 from .results import NAMES, Bifurcation, Branch, Curve, Diagram, diagram, digits_of
-from .switching import leave
+from .switching import NULL, in_family, leave
 
 Direction = Literal["both", "up", "down"]
 
@@ -264,7 +264,14 @@ def _first_point(problem: Equilibria | Cycles, sign: float) -> Point:
     if isinstance(problem, Equilibria):
         problem.scale_along(found.tangent[: problem.size])
     z, tangent = problem.accept(found.z, found.tangent)
-    return Point(z, tangent, 0, problem.critical(z))
+    critical = problem.critical(z)
+    if isinstance(problem, Cycles) and np.any(np.abs(critical.values - 1.0) < NULL) and in_family(problem, z):
+        raise ValueError(
+            f"follow: found many cycles at {problem.names[-1]} = {z[-1]:g}, as under a conserved quantity; expected one alone; "
+            "follow the family in a parameter that breaks the conservation, such as a damping of strength 0 (Muñoz-Almaraz "
+            "et al., Physica D 181, 1 (2003))"
+        )
+    return Point(z, tangent, 0, critical)
 
 
 def _leave(first: Bifurcation, name: str, sign: float, vector: int, size: float) -> tuple[Equilibria | Cycles, Point]:
@@ -333,7 +340,11 @@ def _follow_one_way(problem: Equilibria | Cycles, start: Point, limits: Limits) 
 
     for each in walk(problem, start, limits, events):
         if isinstance(each, Point):
-            points.append((each, problem.solution(each)))
+            try:
+                points.append((each, problem.solution(each)))
+            except ArithmeticError as problem_text:
+                end = f"lost at {name} = {each.value:.8g}: {problem_text}"
+                break
         elif isinstance(each, Corner):
             add_corner(each)
         elif isinstance(each, Located):

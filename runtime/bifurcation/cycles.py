@@ -530,6 +530,19 @@ class Cycles:
         size = len(self.scale)
         return np.asarray(expansion(self.scene.equations, self.classes, size) @ z[:size])
 
+    def network_tangent(self, point: Point) -> np.ndarray:
+        """Return the change of the states of the network where periods of the drive begin, and of the parameters."""
+        q = len(self.names)
+        moved, by = self.states(point.tangent)[:1], point.tangent[len(point.tangent) - q :]
+        if self.begin:
+            values, left = self.values(point.z), np.full(1, self.period(point.z) - self.begin)
+            image = self.flow.linearise(values, self.states(point.z)[:1], left, self.scale)
+            moved = image.propagators @ moved[0] + image.columns @ by
+            if any(slopes := self.period_slopes(values)):
+                flow = flow_of(self.scene, self.flow.equations, self.names, image.states[0])
+                moved += flow.rates(values, image.states) * float(slopes @ by)
+        return np.append(self.network_states(moved[0]), by)
+
     def mode(self, block: int) -> str:
         """Describe a mode of the graph; empty if a multiplier belongs to none."""
         return "" if self.transversal is None or block < 0 else self.transversal.text(block)

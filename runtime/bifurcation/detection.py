@@ -42,6 +42,8 @@ BESIDE, CLEAR = (1e-3, 5e-3, 0.025), 1e-7
 # Growth where one touches zero, relative to that at the ends of the step (a choice): the square of a distance, or two
 # of them, are least where they are known to half of the digits.
 TOUCHED = 1e-6
+# Tangent in the parameter that is an error at both ends of a step, as along a conservative family (a choice).
+VERTICAL = 1e-12
 SHORT = 1e-3  # longest step on which a growth may seem to pass zero without doing so (a choice)
 MOST_HALVINGS = 1000  # most evaluations for a zero: a multiple one takes some hundred (a choice)
 # Solutions of a step from which a branch point is computed, and its largest distance from where it was looked for,
@@ -169,8 +171,9 @@ def bifurcations(
 ) -> list[tuple[float, object]] | None:
     """Return the bifurcations on a step with their distances from its beginning; None if the step is too long."""
     step = BranchStep(problem, before, after, length)
-    turned = before.tangent[-1] * after.tangent[-1] < 0.0
     counts = sorted((critical_of(before).growing, critical_of(after).growing))
+    slopes = problem.weights[-1] * np.array([before.tangent[-1], after.tangent[-1]])
+    turned = slopes[0] * slopes[1] < 0.0 and (counts[0] != counts[1] or abs(slopes).max() > VERTICAL)
     passes = counts[0] != counts[1] or turned
     nearest = None if passes else _pointing_to_zero(before, length)
     try:

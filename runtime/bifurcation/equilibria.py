@@ -237,9 +237,9 @@ class Equilibria:
         residual = float(np.abs(self.linearise(point.z)[0]).max())
         return Equilibrium(scene, state, numbers, self.shifts, speeds, residual, point.corrections)
 
-    def network_states(self, z: np.ndarray) -> np.ndarray:
-        """Return the states of the network in a point or tangent."""
-        return z[: self.size]
+    def network_tangent(self, point: Point) -> np.ndarray:
+        """Return the change of the states of the network, and of the parameters."""
+        return np.append(point.tangent[: self.size], point.tangent[len(point.tangent) - len(self.names) :])
 
     def mode(self, block: int) -> str:
         """Describe a mode of the graph; empty if an eigenvalue belongs to none."""

@@ -44,8 +44,8 @@ def bifurcation_at(problem: Equilibria | Cycles, located: Located) -> Bifurcatio
         vectors = vectors * np.exp(-0.5j * np.angle((vectors**2).sum(axis=1)))[:, None]
         if count == 1:
             coefficient = first_lyapunov_coefficient(problem, point.z, vectors[0], value.imag)
-    if crosses and not (isinstance(problem, Cycles) and problem.begin):
-        tangent = np.append(problem.network_states(point.tangent), point.tangent[-1])
+    if crosses:
+        tangent = problem.network_tangent(point)
     residual = abs(critical.growth[located.index]) / located.scale
     return Bifurcation(
         point.value, located.kind, residual, solution, problem.names[-1], point.length, value, count,

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 import xarray as xr
 
-from synchain.models.inputs.checks import typed_repr
+from synchain.models.inputs.checks import listed, suggestion, typed_repr
 from synchain.models.inputs.display import HasPlot
 from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.scenes.scene import Scene
@@ -32,6 +32,16 @@ NAMES = frozenset([
     "node", "number", "orbit", "period", "periods", "point", "stable", "state", "turn", "vectors",
 ])  # fmt: skip
 """Names in the data of branches and diagrams, which no parameter may have, beside those of all results."""
+
+
+P = TypeVar("P")
+
+
+class PointsByKind(dict[str, tuple[P, ...]], Generic[P]):
+    """Points by kind; another kind raises KeyError with those that there are."""
+
+    def __missing__(self, kind: str) -> tuple[P, ...]:
+        raise KeyError(f"points: found {kind!r}; expected {listed(self) or 'none: no point'}{suggestion(kind, self)}")
 
 
 def digits_of(values: tuple[float, ...] | list[float]) -> str:
@@ -211,7 +221,8 @@ class Branch(Drawable):
     @property
     def points(self) -> Mapping[str, tuple[Bifurcation, ...]]:
         """The bifurcations by kind: `points["fold"]`, `points["Hopf"]`; empty for a kind that did not occur."""
-        return {str(k): tuple(each for each in self.bifurcations if each.kind is k) for k in BifurcationKind}
+        kinds = {str(k): tuple(each for each in self.bifurcations if each.kind is k) for k in BifurcationKind}
+        return PointsByKind(kinds)
 
     @property
     def orbits(self) -> tuple[PeriodicOrbit, ...]:
@@ -434,7 +445,7 @@ class Curve(Labelled):
     def points(self) -> Mapping[str, tuple[CurvePoint, ...]]:
         """The special points by kind: `points["cusp"]`."""
         kinds = dict.fromkeys(each.kind for each in self.special)
-        return {kind: tuple(each for each in self.special if each.kind == kind) for kind in kinds}
+        return PointsByKind({kind: tuple(each for each in self.special if each.kind == kind) for kind in kinds})
 
     @property
     def data(self) -> xr.Dataset:

@@ -24,7 +24,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.models.symmetries.automorphisms import automorphisms
 
 from ..results.labels import States
-from .arclength import Point
+from .arclength import STALLED, Point
 from .problems import BranchProblem, Matrix
 
 # Largest graphs of which automorphisms are listed, and most automorphisms (choices).
@@ -122,6 +122,28 @@ def leave(problem: BranchProblem, vector: np.ndarray, known: np.ndarray) -> Poin
     new = other - share * tangent
     size = float(np.linalg.norm(new[measured]))
     return Point(problem.point, units * new / size, 0, crossing=units * tangent)
+
+
+def in_family(problem: BranchProblem, z: np.ndarray) -> bool:
+    """Return whether a solution is one of many at its parameter, as under a conserved quantity."""
+    units = np.where(problem.weights > 0.0, 1.0 / np.where(problem.weights > 0.0, problem.weights, 1.0), 1.0)
+    residual, matrix = problem.linearise(z)
+    if not isinstance(matrix, np.ndarray):
+        return False
+    right = null_spaces(matrix * units, float(abs(matrix * units).max()))[1]
+    if right.shape[1] < 2:
+        return False
+    # Along a null vector that keeps the parameter there is a solution at a distance; at a branch point there is none.
+    along = right @ np.linalg.svd(right[-1:])[2][-1]
+    point = z + STEP * units * along
+    for _ in range(4):
+        try:
+            residual, matrix = problem.linearise(point)
+        except ArithmeticError:
+            return False
+        rows = np.vstack([(matrix * units)[:, :-1], along[:-1]])
+        point = point + units * np.append(np.linalg.lstsq(rows, np.append(-residual, 0.0))[0], 0.0)
+    return bool(np.all(np.abs(problem.linearise(point)[0]) <= STALLED * problem.noise(point)))
 
 
 def null_spaces(matrix: Matrix, scale: float) -> tuple[np.ndarray, np.ndarray]:

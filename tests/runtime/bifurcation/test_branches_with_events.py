@@ -9,6 +9,8 @@ import pytest
 import sympy as sp
 
 import synchain as sc
+from synchain.runtime.bifurcation.arclength import correct
+from synchain.runtime.bifurcation.cycles import Cycles
 
 X, V, T, A = sp.symbols("x v t a")
 FINE = {"integrator": "taylor", "record": (), "rtol": 1e-11, "atol": 1e-13}
@@ -80,3 +82,20 @@ def test_a_branch_goes_on_where_an_impact_meets_the_beginning_of_a_period() -> N
     alone = sc.periodic_orbit(branch[-1].scene, 1, branch[-1].state)
     np.testing.assert_allclose(alone.state, branch[-1].state, atol=1e-10)
     assert {orbit.phases.words for orbit in branch} == {"open jumps"}
+
+
+@pytest.mark.parametrize("name", ["a", "w"])
+def test_the_tangent_of_a_cycle_that_begins_elsewhere_is_that_at_the_drive(name: str) -> None:
+    """The difference of the orbits beside it; w moves the period too."""
+    gap, rates = sp.Rational(3, 5) - X, {X: A * sp.cos(sp.Symbol("w") * T) - V / 10}
+    stop = sc.Stop(gap, sp.Rational(7, 10))
+    node = sc.Lagrangian(V**2 / 2, X**2 / 2, rates, coordinates={X: V}, parameters={"a": 0.35, "w": 0.8}, events=[stop])
+    orbit = sc.periodic_orbit(sc.Scene(node, initial={"x": 0.4, "v": -0.5}, transient=100))
+    problem = Cycles.of(orbit, name, begin=2.0)
+    ahead = np.append(np.zeros(2), 1.0)
+    point = correct(problem, problem.point, ahead)
+    assert point is not None
+    tangent = problem.network_tangent(point)
+    value, h = orbit.scene.parameters[name], 1e-5
+    plus, minus = (sc.periodic_orbit(orbit.scene, 1, orbit.state, **{name: value + d}).state for d in (h, -h))
+    np.testing.assert_allclose(tangent[:2] / tangent[2], (plus - minus) / (2 * h), rtol=1e-6)

@@ -12,6 +12,7 @@ from functools import cache
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.special import ellipk
 
 import synchain as sc
 from synchain.runtime.bifurcation.cycles import Cycles
@@ -417,3 +418,20 @@ def closes(start: np.ndarray, period: float) -> bool:
     times = np.arange(1, 4) * period / 4
     states = np.vstack([start, flow.advance(scene.parameters, np.tile(start, (3, 1)), times)])
     return Cycles.near(scene, (), (0,), states, period, 0).solved()[1] < 1e-8
+
+
+def test_a_conservative_family_is_followed_in_a_parameter_that_breaks_it() -> None:
+    """The pendulum with damping e: T = 4 K(sin^2(amplitude/2)) at e = 0; along g the cycle is one of many (C)."""
+    node = sc.Field({"q": "v", "v": "-g*sin(q) - e*v"}, parameters={"g": 1, "e": 0})
+    orbit = sc.periodic_orbit(sc.Scene(node), start=[1, 0], period=6.5)
+    with pytest.raises(ValueError, match="follow: found many cycles at g = 1, as under a conserved quantity"):
+        sc.follow(orbit, "g", to=2)
+    family = sc.follow(orbit, "e", within=(-1, 1), longest_period=12, direction="up")
+    q, v = np.array([each.state for each in family]).T
+    periods = [each.period for each in family.orbits]
+    np.testing.assert_allclose(periods, 4 * ellipk(v**2 / 4 + np.sin(q / 2) ** 2), rtol=1e-9)
+    assert max(periods) - min(periods) > 1
+    np.testing.assert_allclose(family.values, 0, atol=1e-8)
+    assert family.points["fold"] == ()
+    with pytest.raises(KeyError, match=r"points: found 'foold'; expected fold, branch point, .* did you mean 'fold'"):
+        family.points["foold"]
