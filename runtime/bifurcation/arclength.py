@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
@@ -55,6 +55,7 @@ class Point:
     tangent: np.ndarray  # (size + 1,): of length 1 in the metric of its problem
     corrections: int
     critical: GrowthNumbers | None = None
+    counts: tuple[int, int] | None = None  # of growing values, by all solutions up to here
     length: float = 0.0  # arclength from the first solution
     crossing: np.ndarray | None = None  # tangent of the branch that is left here
     slopes: np.ndarray | None = None  # change of each growth by the length, on the step before
@@ -181,7 +182,7 @@ def walk(problem: BranchProblem, first: Point, limits: Limits, events: Events) -
         for _, each in sorted([*located, *extra], key=lambda pair: pair[0]):
             yield each
         z, tangent = problem.accept(after.z, after.tangent)
-        before = Point(z, tangent, after.corrections, after.critical, after.length, slopes=_slopes(before, after))
+        before = replace(after, z=z, tangent=tangent, slopes=_slopes(before, after))
         yield before
         if end:
             yield end
@@ -225,7 +226,15 @@ def _advance(
                     end = f"{('period', *problem.names)[place]} = {bound:.8g}"
             if after is not None:
                 critical = problem.critical(after.z)
-                after = Point(after.z, after.tangent, after.corrections, critical, before.length + length)
+                known = before.counts or (before.critical or critical).counts
+                after = Point(
+                    after.z,
+                    after.tangent,
+                    after.corrections,
+                    critical,
+                    critical.passed(known)[1],
+                    before.length + length,
+                )
                 located = [] if before.critical is None else events(problem, before, after, length)
                 if located is not None:
                     return after, located, length, end
@@ -267,4 +276,4 @@ def _at_values(
             if point is not None:
                 h = share * length
                 critical = problem.critical(point.z)
-                yield h, Point(point.z, point.tangent, point.corrections, critical, before.length + h)
+                yield h, replace(point, critical=critical, length=before.length + h)

@@ -37,11 +37,11 @@ from synchain.models.inputs.checks import check_keys, check_positive, check_tabl
 from .arclength import FIRST_STEP, LARGEST_STEP, MOST, Limits, Point, correct, walk
 from .critical_curve import CriticalCurve
 from .cycle_curves import CycleCurve
-from .detection import REAL, TOGETHER, BranchStep
+from .detection import TOGETHER, BranchStep, critical_of
 from .equilibrium import Equilibrium
 from .equilibrium_curves import EquilibriumCurve
 from .kinds import BifurcationKind
-from .problems import BranchProblem
+from .problems import REAL, BranchProblem
 from .results import Bifurcation, Curve, CurvePoint, digits_of
 
 
@@ -85,9 +85,11 @@ def _points(problem: CriticalCurve, step: BranchStep) -> Iterator[tuple[float, C
             # Parameters turn at a cusp, too.
             if all(abs(distance - cusp) > TOGETHER * step.length for cusp in cusps):
                 yield point(f"extreme {name}", distance)
-    counts = sorted(at.critical.growing for at in ends if at.critical is not None)
-    index = counts[0]
-    while index < counts[1]:
+    critical = critical_of(ends[1])
+    change, _ = critical.passed(ends[0].counts or critical_of(ends[0]).counts)
+    index = critical.growing - max(change, 0)
+    beyond = index + abs(change)
+    while index < beyond:
         distance = step.zero(step.growth(index))
         critical = problem.critical(step.at(distance).z)
         value = complex(critical.values[step.passing(distance, index)])

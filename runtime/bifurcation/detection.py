@@ -29,7 +29,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from .arclength import ANGLE, Point, Test, correct
 from .kinds import BifurcationKind
-from .problems import BranchProblem, GrowthNumbers
+from .problems import REAL, BranchProblem, GrowthNumbers
 
 # Bifurcations nearer than this part of a step are one of higher multiplicity, or lie on a turn (a choice).
 TOGETHER = 1e-8
@@ -49,8 +49,6 @@ MOST_HALVINGS = 1000  # most evaluations for a zero: a multiple one takes some h
 # Solutions of a step from which a branch point is computed, and its largest distance from where it was looked for,
 # relative to half of the step (choices).
 NODES, NEAR = 9, 1e-3
-# A value whose imaginary part is smaller, relative to the largest value, is real: the square root of rounding.
-REAL = 1e-7
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,14 +169,16 @@ def bifurcations(
 ) -> list[tuple[float, object]] | None:
     """Return the bifurcations on a step with their distances from its beginning; None if the step is too long."""
     step = BranchStep(problem, before, after, length)
-    counts = sorted((critical_of(before).growing, critical_of(after).growing))
+    critical = critical_of(after)
+    change, _ = critical.passed(before.counts or critical_of(before).counts)
     slopes = problem.weights[-1] * np.array([before.tangent[-1], after.tangent[-1]])
-    turned = slopes[0] * slopes[1] < 0.0 and (counts[0] != counts[1] or abs(slopes).max() > VERTICAL)
-    passes = counts[0] != counts[1] or turned
+    turned = slopes[0] * slopes[1] < 0.0 and (change != 0 or abs(slopes).max() > VERTICAL)
+    passes = change != 0 or turned
     nearest = None if passes else _pointing_to_zero(before, length)
     try:
         if passes:
-            return _found(step, range(*counts), turned)
+            first = critical.growing - max(change, 0)
+            return _found(step, range(first, first + abs(change)), turned)
         # The step may have passed a branch point onto the other branch, or values that exchange their signs.
         return [] if nearest is None else None if length >= SHORT else _touching(step, nearest)
     except ArithmeticError:

@@ -75,6 +75,29 @@ class GrowthNumbers(NamedTuple):
         """Number of values past neutrality by more than their errors."""
         return int((self.growth > self.errors).sum())
 
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Least and largest number of growing values: real ones that are zero to their errors may grow.
+
+        A neutral pair may not: where it meets and parts on the real axis a value passes.
+        """
+        unsure = (np.abs(self.growth) <= self.errors) & (np.abs(self.values.imag) <= REAL * self.scale)
+        return self.growing, self.growing + int(unsure.sum())
+
+    def passed(self, counts: tuple[int, int]) -> tuple[int, tuple[int, int]]:
+        """Return how many values have passed zero beyond their errors since there were `counts`, and the counts now.
+
+        A value that was never decaying, as of cycles that are just born, passes nowhere when its sign shows.
+        """
+        (low, high), (least, most) = counts, self.counts
+        steps = sorted((least - low, most - high), key=abs)
+        change = steps[0] if steps[0] * steps[1] > 0 else 0
+        low, high = max(low + change, least), min(high + change, most)
+        return change, ((low, high) if low <= high else self.counts)
+
+
+REAL = 1e-7
+"""A value whose imaginary part is smaller, relative to the largest value, is real: the square root of rounding."""
 
 UNSURE = 1e-6
 """Growth of which the error is estimated, relative to the largest value: a thousand roots of rounding, to which the

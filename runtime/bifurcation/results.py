@@ -130,9 +130,13 @@ class Bifurcation(Labelled):
         if not np.isnan(self.critical):
             rows.append(("critical", f"{self.critical:.8g}"))
         if self.kind is BifurcationKind.HOPF:
-            side = "supercritical" if self.lyapunov < 0.0 else "subcritical"
             rows.append(("frequency", f"{self.frequency:.12g}"))
-            rows.append(("Lyapunov coefficient", f"{self.lyapunov:.6g}, {side}"))
+            if not np.isnan(self.lyapunov):
+                side = "supercritical" if self.lyapunov < 0.0 else "subcritical"
+                rows.append(("Lyapunov coefficient", f"{self.lyapunov:.6g}, {side}"))
+        if len(self.vectors) > 1:
+            classes = f"{len(self.vectors)} that no symmetry maps to each other"
+            rows.append(("branches", f"{classes}: follow(…, vector=k), k = 0 to {len(self.vectors) - 1}"))
         if self.mode:
             rows.append(("mode", self.mode))
         return (*rows, ("residual", f"{self.residual:.1e}"))

@@ -134,3 +134,18 @@ def test_cycles_end_at_their_hopf_point_to_rounding() -> None:
     first = sc.periodic_orbit(sc.Scene(brusselator, initial={"x": 2.5, "y": 3}))
     (end,) = sc.follow(first, "B", to=4).bifurcations
     assert (end.kind, end.value) == ("Hopf", pytest.approx(5.0, rel=1e-13))
+
+
+def test_three_cycles_are_born_in_a_double_hopf_point_of_a_ring() -> None:
+    """Standing waves have a multiplier 1 to all digits near their birth: its sign shows later, and passes nowhere."""
+    rates = {"x": "m*x - y - x*(x**2 + y**2)", "y": "x + m*y + (0.3*x - y)*(x**2 + y**2)"}
+    link = sc.Rates({"x": "0.3*W*(x_j - x_i)", "y": "0.3*W*(y_j - y_i)"})
+    scene = sc.Scene(sc.Field(rates, parameters={"m": 0.2}), link, sc.graphs.ring(5), initial={"x": 0, "y": 0})
+    (hopf,) = sc.follow(sc.equilibrium(scene), "m", to=0.6).points["Hopf"]
+    assert hopf.value == pytest.approx(0.3 * (2 - 2 * np.cos(2 * np.pi / 5)), abs=1e-12)
+    rows = dict(hopf.summary)
+    assert rows["branches"] == "3 that no symmetry maps to each other: follow(…, vector=k), k = 0 to 2"
+    assert "Lyapunov coefficient" not in rows
+    standing = sc.follow(hopf, "m", to=0.42)
+    assert len(set(standing[-1].classes)) == 3
+    assert standing.bifurcations == ()
