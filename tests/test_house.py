@@ -49,7 +49,7 @@ ARROWS = {
     "codegen.taylor": "steps program integrators simd models",
     "codegen.kernels": "taylor steps program driver integrators simd models",
     "codegen.machine_code": "kernels driver steps front_end simd models",
-    "codegen.export": "program integrators models",
+    "codegen.export": "driver program integrators models",
     "runtime.support": "models.inputs",
     "runtime.cells": "support codegen models",
     "runtime.prediction": "support models",

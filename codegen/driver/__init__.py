@@ -6,16 +6,23 @@ The files are Python that can be read and checked; their text becomes part of ev
 from __future__ import annotations
 
 import functools
+import re
 from importlib.resources import files
 
-__all__ = ["MARK", "text"]
+__all__ = ["MARK", "text", "without_annotations"]
 
 MARK = "# --- kernel text below ---\n"
 
 
 @functools.cache
-def text(name: str) -> str:
-    """Return the part of a file that a generated module contains."""
+def text(name: str, annotated: bool = False) -> str:
+    """Return the part of a file that a generated module contains, with its annotations or without."""
     room, _, file = name.partition(".")
     whole = files(__name__.rpartition(".")[0]).joinpath(room, f"{file}.py").read_text(encoding="utf-8")
-    return whole.split(MARK, 1)[1].strip("\n")
+    part = whole.split(MARK, 1)[1].strip("\n")
+    return part if annotated else without_annotations(part)
+
+
+def without_annotations(part: str) -> str:
+    """Return a text without the annotations in the heads of its functions."""
+    return re.sub(r"^def .*", lambda head: re.sub(r": \w+(?=[,)])|(?<=\)) -> \w+", "", head[0]), part, flags=re.M)

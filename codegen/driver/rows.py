@@ -2,11 +2,8 @@
 
 A node below is any group of rows that are solved together: those of one node, or of the nodes that links join.
 An event of a node has two parts.  Guards reset states and stops rebound: speeds jump.  Then all rows on their surfaces
-are decided together: of all sets of held rows that agree with the laws (held: |x| <= r, or x >= 0 at a stop; others leave
-the surface) the one with most held rows, then with fewest changes of mode, then with the least largest |x|.  Held rows
-are put on their surfaces, here and after each step.  If friction does not drop at the start of slip, that
-set is the only one if K is a P-matrix (Samelson, Thrall & Wesler, Proc. AMS 9, 805 (1958); Cottle, Pang & Stone, The
-Linear Complementarity Problem (Academic Press, 1992), chapter 3).  Else the cell ends as AMBIGUOUS.
+are decided together (decisions.py).  Held rows are put on their surfaces, here and after each step.  A cell whose rows
+have no single answer ends as AMBIGUOUS.
 
 A stop closes when its rebounds have become LOWEST times as high as the first ones, in any unit.  After a rebound with the
 speed u against the acceleration a the remaining ones take the time 2 u/(a (1 - e)) and pass on the same momentum as one
@@ -24,6 +21,7 @@ from numba import njit
 from ..simd.lanes import any_lane, broadcast, lane_bits, store
 from .cells import put
 from .clock_slots import *
+from .decisions import decide, eliminated, forces
 from .gaps import GAP, LAW, LEVEL, MODE, NUMBER, RATE, RATIO, SPEED, K, clear_scales, place, push, smallest_gap
 
 # --- kernel text below ---
@@ -34,6 +32,8 @@ UNTOUCHED, KNOWN, OPEN, RELEASED = 0.0, 1.0, 2.0, 3.0
 # of the changes of speed by impulses without their signs.
 ROLE, BEFORE, SPEED_BEFORE, X, SHUT, FELT = 0, 1, 2, 3, 4, 5
 NOTES = 6
+# Numbers for each row of a node that is decided (decisions.py): groups of `pushes`, and notes in place of those it skips.
+GROUPS = 64
 # A pivot, or a change of a speed, this much smaller than what it is the difference of is zero.
 NONE = 1e-12
 # Height of the last rebound of a stop over that of the first ones (a choice).
@@ -75,211 +75,45 @@ def strike(t, y, friction):
 
 
 @njit(error_model="numpy")
-def solved(matrix, right, chosen, size):
-    """Solve the equations of the chosen rows in place of `right`; return False if they depend on each other."""
+def gathered(notes, lane, first, size, friction):
+    """Return the numbers of the rows of a node in one lane, for `decide` and `forces`."""
+    rows, out, dims = np.zeros(size * GROUPS), friction.out, friction.dims
     for a in range(size):
-        if not chosen[a]:
-            continue
-        pivot, scale = matrix[a, a], 0.0
+        for note in (ROLE, BEFORE, X):
+            rows[a * GROUPS + note] = notes[first + a, note]
+        for group in (MODE, RATE, RATIO):
+            rows[a * GROUPS + group] = number(group, first + a, lane, out, dims)
+        rows[a * GROUPS + LAW] = (
+            OF_STOP if is_stop(first + a, lane, out, dims) else number(LAW, first + a, lane, out, dims)
+        )
         for b in range(size):
-            if chosen[b]:
-                scale = max(scale, abs(matrix[a, b]))
-        if not abs(pivot) > NONE * scale:
-            return False
-        for r in range(size):
-            if chosen[r] and r != a:
-                factor = matrix[r, a] / pivot
-                for c in range(size):
-                    if chosen[c]:
-                        matrix[r, c] = matrix[r, c] - factor * matrix[a, c]
-                matrix[r, a] = 0.0
-                right[r] = right[r] - factor * right[a]
-    for a in range(size):
-        if chosen[a]:
-            right[a] = right[a] / matrix[a, a]
-    return True
-
-
-@njit(error_model="numpy")
-def hold(modes, chosen, x, lane, first, size, out, dims):
-    """Compute x of all rows of a node in some modes, the chosen ones held; return False if these depend on each other."""
-    matrix = np.empty((size, size))
-    for a in range(size):
-        x[a] = 0.0 if chosen[a] or number(LAW, first + a, lane, out, dims) != OF_SIGN else modes[a]
-    right = np.empty(size)
-    for a in range(size):
-        right[a] = number(RATE, first + a, lane, out, dims)
-        for b in range(size):
-            matrix[a, b] = number(K + b, first + a, lane, out, dims)
-            right[a] -= matrix[a, b] * x[b]
-    good = solved(matrix, right, chosen, size)
-    for a in range(size):
-        if chosen[a]:
-            x[a] = right[a]
-    return good
-
-
-@njit(error_model="numpy")
-def positive_minors(chosen, lane, first, size, out, dims):
-    """Return True if K of the chosen rows is a P-matrix; rows that do not feel themselves are left out."""
-    members = 0
-    for a in range(size):
-        if chosen[a] and number(K + a, first + a, lane, out, dims) != 0.0:
-            members |= 1 << a
-    for subset in range(1, 1 << size):
-        if subset & ~members:
-            continue
-        matrix, sign = np.empty((size, size)), 1.0
-        for a in range(size):
-            for b in range(size):
-                matrix[a, b] = number(K + b, first + a, lane, out, dims)
-        for a in range(size):
-            if (subset >> a) & 1:
-                sign = sign if matrix[a, a] > 0.0 else -1.0
-                for r in range(a + 1, size):
-                    if (subset >> r) & 1:
-                        factor = matrix[r, a] / matrix[a, a]
-                        for c in range(size):
-                            matrix[r, c] = matrix[r, c] - factor * matrix[a, c]
-        if sign < 0.0:
-            return False
-    return True
-
-
-@njit(error_model="numpy")
-def agrees(modes, chosen, decided, x, slack, lane, first, size, out, dims):
-    """Return True if the held rows can be held and the others leave their surfaces."""
-    for a in range(size):
-        if not decided[a]:
-            continue
-        row = first + a
-        stop, ratio = is_stop(row, lane, out, dims), number(RATIO, row, lane, out, dims)
-        if chosen[a]:
-            good = x[a] >= -slack if stop else abs(x[a]) <= ratio + slack * ratio
-        else:
-            rate, scale = number(RATE, row, lane, out, dims), abs(number(RATE, row, lane, out, dims))
-            for b in range(size):
-                term = number(K + b, row, lane, out, dims) * x[b]
-                rate, scale = rate - term, max(scale, abs(term))
-            # a row leaves to the side of its mode; an open stop has a speed that falls
-            good = (-rate if stop else modes[a] * rate) > -slack * scale
-        if not good:
-            return False
-    return True
-
-
-@njit(error_model="numpy")
-def known_modes(notes, modes, decided, lane, first, size, out, dims):
-    """Fill the modes that an event determines, mark the rows that forces decide, and return the number of choices."""
-    count = 1
-    for a in range(size):
-        row = first + a
-        decided[a] = notes[row, ROLE] == OPEN
-        count *= 3 if decided[a] else 1
-        modes[a] = number(MODE, row, lane, out, dims)
-        if notes[row, ROLE] == RELEASED:
-            # a stop opens, a contact slips to the side of its force
-            opens = is_stop(row, lane, out, dims)
-            modes[a] = 1.0 if opens or notes[row, X] > 0.0 else -1.0
-    return count
-
-
-@njit(error_model="numpy")
-def choose(code, notes, modes, chosen, decided, lane, first, size, out, dims):
-    """Set the modes of one choice; return the numbers of held rows and of changes, -1 held for a stop with mode -1.
-
-    The digits of the choice in base 3 are the modes of the decided rows: 0 held, 1, 2 for mode -1.
-    """
-    held, changes, left = 0, 0, code
-    for a in range(size):
-        chosen[a] = False
-        if decided[a]:
-            left, digit = left // 3, left % 3
-            if digit == 2 and is_stop(first + a, lane, out, dims):
-                return -1, 0
-            chosen[a] = digit == 0
-            modes[a] = 0.0 if digit == 0 else 1.0 if digit == 1 else -1.0
-            held += int(digit == 0)
-            changes += int(modes[a] != notes[first + a, BEFORE])
-    return held, changes
-
-
-@njit(error_model="numpy")
-def friction_drops(decided, lane, first, size, out, dims):
-    """Return True if friction of a decided row drops where slip begins, so that several sets may agree with the laws."""
-    for a in range(size):
-        row = first + a
-        if decided[a] and number(LAW, row, lane, out, dims) == OF_SIGN and number(RATIO, row, lane, out, dims) > 1.0:
-            return True
-    return False
-
-
-@njit(error_model="numpy", forceinline=True)
-def is_better(held, changes, largest, most, fewest, least):
-    """Return True for more held rows, then for fewer changes, then for a smaller largest force."""
-    return held > most or (held == most and (changes < fewest or (changes == fewest and largest < least)))
-
-
-@njit(error_model="numpy")
-def decide(notes, lane, first, size, friction):
-    """Store the modes of the rows of a node after an event; return False if the laws determine none."""
-    out, dims = friction.out, friction.dims
-    modes, x = np.empty(size), np.empty(size)
-    chosen, decided = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
-    count = known_modes(notes, modes, decided, lane, first, size, out, dims)
-    # the best choice so far; without rows to decide the modes are known
-    best, matches, most, fewest, least = 0, 0, -1, 0, 0.0
-    for slack in (0.0, 1e-9):
-        if matches > 0:
-            break
-        for code in range(count):
-            held, changes = choose(code, notes, modes, chosen, decided, lane, first, size, out, dims)
-            if held < 0 or not hold(modes, chosen, x, lane, first, size, out, dims):
-                continue
-            if not agrees(modes, chosen, decided, x, slack, lane, first, size, out, dims):
-                continue
-            matches += 1
-            largest = 0.0
-            for a in range(size):
-                largest = max(largest, abs(x[a]) if decided[a] else 0.0)
-            if is_better(held, changes, largest, most, fewest, least):
-                best, most, fewest, least = code, held, changes, largest
-        if matches > 1 and slack > 0.0:
-            matches = 1  # on the border of two sets, which are the same motion
-    if matches > 0:
-        choose(best, notes, modes, chosen, decided, lane, first, size, out, dims)
-    for a in range(size):
-        known = matches > 0 or not decided[a]
-        put(out, place(MODE, first + a, dims), lane, modes[a] if known else number(MODE, first + a, lane, out, dims))
-    if friction_drops(decided, lane, first, size, out, dims):
-        return matches > 0 and positive_minors(decided, lane, first, size, out, dims)
-    return matches == 1
+            rows[a * GROUPS + K + b] = number(K + b, first + a, lane, out, dims)
+    return rows
 
 
 @njit(error_model="numpy")
 def begin_event(notes, lane, first, size, friction):
     """Note what an event means for the rows of a node, and set the impulses of stops; 2 if ambiguous, 1 if speeds jump."""
     out, dims = friction.out, friction.dims
-    modes, x, chosen = np.empty(size), np.empty(size), np.zeros(size, np.bool_)
+    modes, x = np.empty(size), np.empty(size)
     speeds, hit, outcome = np.empty(size), np.zeros(size, np.bool_), 0
     for a in range(size):
         modes[a] = number(MODE, first + a, lane, out, dims)
-        chosen[a] = modes[a] == 0.0
-    hold(modes, chosen, x, lane, first, size, out, dims)
+    forces(modes, x, 0, size, gathered(notes, lane, first, size, friction))
     for a in range(size):
         row = first + a
         law, shut = number(LAW, row, lane, out, dims), number(GAP, row, lane, out, dims) <= 0.0
         speeds[a] = number(SPEED, row, lane, out, dims)
         notes[row, BEFORE], notes[row, SPEED_BEFORE], notes[row, X] = modes[a], speeds[a], x[a]
         notes[row, SHUT] = 1.0 if shut else 0.0
-        if chosen[a]:
+        if modes[a] == 0.0:
             notes[row, ROLE] = RELEASED if shut else OPEN
         else:
             notes[row, ROLE] = OPEN if shut and law == OF_SIGN else KNOWN
         if shut and law == OF_RESET:
             put(out, place(K + dims.felt + 2, row, dims), lane, 1.0)
             outcome = 1
-        hit[a] = shut and is_stop(row, lane, out, dims) and not chosen[a]
+        hit[a] = shut and is_stop(row, lane, out, dims) and modes[a] != 0.0
         outcome = 1 if hit[a] else outcome
     if outcome == 1 and not rebound(notes, hit, speeds, x, lane, first, size, friction):
         outcome = 2
@@ -390,23 +224,23 @@ def after_jump(notes, lane, first, size, friction):
 def project_held(lane, first, size, friction):
     """Set the impulses that put the held rows of a node onto their surfaces; return True if there are any."""
     out, dims, felt = friction.out, friction.dims, friction.dims.felt
-    matrix, right, chosen = np.empty((size, size)), np.empty(size), np.zeros(size, np.bool_)
+    matrix, right, modes = np.empty(size * size), np.empty(size), np.empty(size)
     for a in range(size):
-        chosen[a] = number(MODE, first + a, lane, out, dims) == 0.0
+        modes[a] = number(MODE, first + a, lane, out, dims)
     for _ in range(size):
         for a in range(size):
             right[a] = number(SPEED, first + a, lane, out, dims)
             for b in range(size):
-                matrix[a, b] = number(K + b, first + a, lane, out, dims)
-        if solved(matrix, right, chosen, size):
+                matrix[a * size + b] = number(K + b, first + a, lane, out, dims)
+        if eliminated(matrix, right, modes, size) != 0.0:
             break
         for a in range(size - 1, -1, -1):  # rows that depend on each other: leave the last one out
-            if chosen[a]:
-                chosen[a] = False
+            if modes[a] == 0.0:
+                modes[a] = 1.0
                 break
     found = False
     for a in range(size):
-        if chosen[a]:
+        if modes[a] == 0.0:
             row, found = first + a, True
             put(out, place(K + felt, row, dims), lane, right[a])
             if is_stop(row, lane, out, dims):
@@ -458,8 +292,11 @@ def end_events(lanes, notes, friction):
                 closed = closed or notes[lane, row, ROLE] != UNTOUCHED
             if closed:
                 after_jump(notes[lane], lane, first, size, friction)
-                if not decide(notes[lane], lane, first, size, friction):
+                rows = gathered(notes[lane], lane, first, size, friction)
+                if decide(0, size, rows) == 0:
                     put(friction.clock, RUSH, lane, math.inf)
+                for a in range(size):
+                    put(out, place(MODE, first + a, dims), lane, rows[a * GROUPS + MODE])
                 project_held(lane, first, size, friction)
             first += size
 

@@ -12,6 +12,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.events import Event
 from synchain.models.mechanics.rows import NO_MODE, Law, Row, struck
 
+from .. import driver
 from ..integrators import dop853
 from ..program.expressions import Expression, Load, Number
 from ..program.passes import real
@@ -165,10 +166,11 @@ def tables() -> dict[str, list[str]]:
 
 def algorithm() -> str:
     """Return the functions of a run, in Python."""
-    return Path(event_text.__file__).read_text(encoding="utf-8").partition(MARK)[2]
+    decisions = driver.text("driver.decisions", annotated=True).replace('@njit(error_model="numpy")\n', "")
+    whole = Path(event_text.__file__).read_text(encoding="utf-8").partition(MARK)[2]
+    return whole.replace("# --- decisions ---", decisions)
 
 
 def algorithm_in_lists() -> str:
     """Return the functions of a run in Python without annotations, with lists in place of arrays."""
-    source = re.sub(r"(\w+): (?:float|int|Doubles|Seen)\b", r"\1", re.sub(r"\) -> \w+:", "):", algorithm()))
-    return re.sub(r"np\.empty\((.+)\)", r"[0.0] * (\1)", source)
+    return re.sub(r"np\.empty\((.+)\)", r"[0.0] * (\1)", driver.without_annotations(algorithm()))

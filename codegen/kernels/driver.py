@@ -109,7 +109,7 @@ class Driver:
             "LOOPED": self.looped,
             "SERIES": self.series,
         }
-        of_contacts = ["gaps", "rows" if self.rows else "contacts", "passages"]
+        of_contacts = ["gaps", *(["decisions", "rows"] if self.rows else ["contacts"]), "passages"]
         contacts, landings = (of_contacts, ["landings", "event_modes"]) if self.contacts else ([], [])
         frames = ["frames", "lifted_frames"] if self.kind is KernelKind.FRAME else []
         last = ["propagators", *landings, "frames", "modes"] if modes else ["spread", "sweep", *frames]

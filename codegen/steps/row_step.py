@@ -38,6 +38,7 @@ from .step import lane
 
 LAWS = {Law.SIGN: 0, Law.STOP: 1, Law.RESET: 2}  # the numbers of laws in the driver
 STOP_IN_ORDER = 3
+MOST_EVENTS = 52  # rows that are decided together: GROUPS - K (codegen/driver/rows.py)
 LEVEL, GAP, MODE, SPEED, RATE, RATIO = range(6)  # the groups of numbers in front of the looks
 
 
@@ -48,7 +49,10 @@ def law_number(row: Row) -> sp.Integer:
 
 def most_rows(equations: Equations) -> int:
     """Return the largest number of rows of a node, or of a part that links join."""
-    return max(len(rows) for rows in all_rows(equations))
+    most = max(len(rows) for rows in all_rows(equations))
+    if most > MOST_EVENTS:
+        raise ValueError(f"events: found {most} of a node, or of nodes that they join; expected at most {MOST_EVENTS}")
+    return most
 
 
 def all_rows(equations: Equations) -> list[tuple[Row, ...]]:

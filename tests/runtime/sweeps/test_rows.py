@@ -11,6 +11,9 @@ import pytest
 import sympy as sp
 
 import synchain as sc
+from synchain.codegen.driver.gaps import K
+from synchain.codegen.driver.rows import GROUPS
+from synchain.codegen.steps.row_step import MOST_EVENTS
 
 X, V, T, TH, OM, PH, SI, W = sp.symbols("x v t th om ph si w")
 R, SIGN = sp.Rational, sp.sign(sp.Symbol("w"))
@@ -162,3 +165,13 @@ def test_a_contact_lands_again_in_the_step_of_its_release() -> None:
     right = end(scene(cart_pole(), 10.0, "dop853", initial=start), x_1=places)
     loose = end(scene(cart_pole(), 10.0, "taylor", initial=start, rtol=1e-8, atol=1e-9), x_1=places)
     np.testing.assert_allclose(loose, right, atol=1e-8)
+
+
+def test_rows_that_are_decided_together_fit_their_memory() -> None:
+    level = sp.Symbol("v")
+    many = [sc.Reset(level - k, {level: -1}) for k in range(1, MOST_EVENTS + 2)]
+    cells = [sc.Scene(sc.Field({level: 1 - level}, events=many[:n])) for n in (MOST_EVENTS, MOST_EVENTS + 1)]
+    assert sc.kernel(cells[0]).equations.has_rows
+    with pytest.raises(ValueError, match="events: found 53 of a node, or of nodes that they join; expected at most 52"):
+        sc.kernel(cells[1])
+    assert GROUPS - K == MOST_EVENTS
