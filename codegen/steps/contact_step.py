@@ -20,7 +20,7 @@ from synchain.models.dynamics.periodicity import gaps
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.mechanics.events import Event
 
-from ..program.expressions import Load, Name, Number
+from ..program.expressions import Expression, Load, Name, Number
 from ..program.lowering import lower
 from ..program.passes import Hoist, Names, real, share
 from ..program.statements import Assign, Function, Role, Statement, accumulate, let, store
@@ -64,13 +64,29 @@ def jump_sides(zeros: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
     return (now, now.xreplace({TIME: TIME + SOON * sp.Max(1, TIME)})) if signs else ()
 
 
+def written_sides(equations: Equations) -> tuple[sp.Expr, ...]:
+    """Return the numbers of `jump_sides` for all nodes and links."""
+    n = equations.n
+    zeros = [e.xreplace(equations.at_node(i)) for i in range(n) for e in time_gaps(equations.node_at(i))]
+    zeros += [e.xreplace(equations.at_link(link, edge)) for link, edge in equations.linked() for e in time_gaps(edge)]
+    return jump_sides(zeros)
+
+
+def looped_sides(equations: Equations, names: Names, rows: Expression | int) -> tuple[set[sp.Symbol], list[Statement]]:
+    """Return the symbols of the numbers of `jump_sides`, and the statements that store them behind the groups of rows."""
+    # skip jumps in time whose parameters differ from node to node or link to link: step control handles them
+    differing = set(map(real, (*equations.varied, *equations.numbered)))
+    zeros = [e for part in equations.templates for e in time_gaps(part) if not e.free_symbols & differing]
+    sides = share(jump_sides(zeros), names.fresh("side"))
+    stores = [store("out", SIDES * rows + k, lane(lower(e))) for k, e in enumerate(sides.results)]
+    return sides.symbols, [*assigned(sides), *stores]
+
+
 def _written_out(equations: Equations, names: Names) -> list[Statement]:
     n = equations.n
     events = [event for i in range(n) for event in equations.events_at(i)]
     columns = [e for column in zip(*map(_columns, events), strict=True) for e in column]
-    zeros = [e.xreplace(equations.at_node(i)) for i in range(n) for e in time_gaps(equations.node_at(i))]
-    zeros += [e.xreplace(equations.at_link(link, edge)) for link, edge in equations.linked() for e in time_gaps(edge)]
-    body = share([*columns, *jump_sides(zeros)], names.fresh("z"))
+    body = share([*columns, *written_sides(equations)], names.fresh("z"))
     states = [let(name, Load("y", Number(k))) for k, name in enumerate(equations.state) if real(name) in body.symbols]
     places = [*range(len(columns)), *(SIDES * n + k for k in range(2))]
     stores = [store("out", k, lane(lower(e))) for k, e in zip(places, body.results, strict=False)]
@@ -86,15 +102,10 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
     fixed = Hoist(frozenset((*node.state, *varied)), names.fresh("fixed"), frozenset({TIME}))
     body = share([fixed.apply(e) for e in _columns(event)], names.fresh("z"))
     forces, force = _force(equations, places, event)
-    # skip jumps in time whose parameters differ from node to node or link to link: step control handles them
-    differing = set(map(real, (*equations.varied, *equations.numbered)))
-    parts: tuple[Node | Edge, ...] = (node, *equations.edges)
-    zeros = [e for part in parts for e in time_gaps(part) if not e.free_symbols & differing]
-    sides = share(jump_sides(zeros), names.fresh("side"))
-    used = body.symbols.union(sides.symbols, *(e.free_symbols for e in (*fixed.table, *force)))
+    of_sides, sides = looped_sides(equations, names, Name("NODES"))
+    used = body.symbols.union(of_sides, *(e.free_symbols for e in (*fixed.table, *force)))
     statements = [*parameter_loads(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]
-    statements += assigned(sides)
-    statements += [store("out", SIDES * Name("NODES") + k, lane(lower(e))) for k, e in enumerate(sides.results)]
+    statements += sides
     loop: list[Statement] = [let(s.name, Load("y", places.place(k))) for k, s in enumerate(node.state) if s in used]
     loop += [*places.own(body.symbols), *assigned(body)]
     loop += [store("out", places.place(k), lane(lower(e))) for k, e in enumerate(body.results)]

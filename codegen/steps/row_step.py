@@ -23,7 +23,7 @@ import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
-from synchain.models.mechanics.components import Edge, Node
+from synchain.models.mechanics.components import Node
 from synchain.models.mechanics.rows import Law, Row, forces, struck, term_size
 
 from ..program.expressions import Compare, Expression, Load, Name, Number, call, plus
@@ -31,7 +31,7 @@ from ..program.lowering import lower
 from ..program.passes import Names, StraightLine, real, share
 from ..program.statements import Assign, Function, If, Role, Statement, accumulate, let, store
 from .blocks import assigned
-from .contact_step import SIDES, jump_sides, parameter_loads, push_functions, time_gaps
+from .contact_step import SIDES, looped_sides, parameter_loads, push_functions, written_sides
 from .places import Joint, Span, StateLayout, by_kind, link_ends, named
 from .safe_names import NAMES
 from .step import lane
@@ -177,11 +177,7 @@ class _Group:
 class _WrittenOut(_Writer):
     def pushes(self) -> list[Statement]:
         equations = self.equations
-        zeros = [e.xreplace(equations.at_node(i)) for i in range(equations.n) for e in time_gaps(equations.node_at(i))]
-        zeros += [
-            e.xreplace(equations.at_link(link, edge)) for link, edge in equations.linked() for e in time_gaps(edge)
-        ]
-        sides = jump_sides(zeros)
+        sides = written_sides(equations)
         ends = [Number(SIDES * self.rows + k) for k in range(len(sides))]
         if equations.joined:
             used, stores = self.of_parts(sides, ends)
@@ -284,17 +280,8 @@ class _Looped(_Writer):
         return plus(len(self.equations.nodes[kind].rows) * Name(index), Number(self.offsets[kind] + a))
 
     def pushes(self) -> list[Statement]:
-        equations, statements = self.equations, []
-        differing = set(map(real, (*equations.varied, *equations.numbered)))
-        parts: tuple[Node | Edge, ...] = (*equations.nodes, *equations.edges)
-        sides = share(
-            jump_sides([e for part in parts for e in time_gaps(part) if not e.free_symbols & differing]),
-            self.names.fresh("side"),
-        )
-        used = set(sides.symbols)
-        tail = [store("out", SIDES * self.rows + k, lane(lower(e))) for k, e in enumerate(sides.results)]
-        statements += [*assigned(sides), *tail]
-        loops = []
+        equations, loops = self.equations, list[Statement]()
+        used, sides = looped_sides(equations, self.names, self.rows)
         for kind in self.layout.kinds:
             loops += self.of_node(kind.node, kind.number, used)
         for joint in self.layout.joints:
@@ -302,7 +289,7 @@ class _Looped(_Writer):
         for kind in self.layout.kinds:
             loops += self.gaps(kind.node, kind.number)
         head = [Assign(NAMES, Name("graph"), whole=True)]
-        return [*head, *parameter_loads(equations, used), *statements, *loops]
+        return [*head, *parameter_loads(equations, used), *sides, *loops]
 
     def of_node(self, node: Node, number: int, used: set[sp.Symbol]) -> list[Statement]:
         if not node.rows:
