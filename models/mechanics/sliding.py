@@ -11,7 +11,7 @@ Modes in Control and Optimization (Springer, 1992); Alexander & Seidman, Houston
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import sympy as sp
 from sympy.functions.elementary.piecewise import Piecewise
@@ -24,20 +24,37 @@ from .rows import Law, Surface
 def sliding_surfaces(state: Sequence[sp.Symbol], rates: Sequence[sp.Expr]) -> tuple[tuple[sp.Expr, ...], list[Surface]]:
     """Return the rates without the signs that become surfaces, and these surfaces."""
     plain = [e.replace(Piecewise, _by_sign) for e in rates]
-    moving = set(state)
-    signs = sorted({s for e in plain for s in e.atoms(sp.sign) if s.free_symbols & moving}, key=sp.default_sort_key)
-    swap = {s: sp.Dummy(f"s{k}", real=True) for k, s in enumerate(signs)}
-    smooth, pushes = [e.xreplace(swap) for e in plain], {}
-    for sign, s in swap.items():
-        # linear in the sign: exact at +1 and -1
-        pushes[sign] = [sp.expand(e.xreplace({s: sp.S.One}) - e.xreplace({s: sp.S.NegativeOne})) / 2 for e in smooth]
-    held = [
-        sign
-        for sign, push in pushes.items()
-        if sp.simplify(sp.Add(*(derivative(sign.args[0], x) * g for x, g in zip(state, push, strict=True)))) != 0
-    ]
+    signs = sorted({s for e in plain for s in e.atoms(sp.sign) if s.has(*state)}, key=sp.default_sort_key)
     if not signs:
         raise ValueError("contact 'set-valued': found no sign of states in the rates; leave it out")
+    swap = {sign: sp.Dummy(f"s{k}", real=True) for k, sign in enumerate(signs)}
+    smooth = [e.xreplace(swap) for e in plain]
+    # linear in the sign: exact at +1 and -1
+    sides = {
+        sign: [[e.xreplace({s: one}) for e in smooth] for one in (sp.S.One, -sp.S.One)] for sign, s in swap.items()
+    }
+    pushes = {sign: [sp.expand(up - down) / 2 for up, down in zip(*both, strict=True)] for sign, both in sides.items()}
+    held = [sign for sign in signs if _may_be_held(sign, state, pushes[sign])]
+    _refuse_products(held, swap, pushes)
+    held += [sign for sign in signs if sign not in held and _stands_alone(sign, swap, pushes)]
+    for s in map(swap.__getitem__, held):
+        smooth = [(e.xreplace({s: sp.S.One}) + e.xreplace({s: sp.S.NegativeOne})) / 2 for e in smooth]
+    back = {s: sign for sign, s in swap.items()}
+    surfaces = [Surface(Law.SIGN, sign.args[0], tuple(e.xreplace(back) for e in pushes[sign])) for sign in held]
+    return tuple(sp.expand(e).xreplace(back) for e in smooth), surfaces
+
+
+Pushes = Mapping[sp.Expr, Sequence[sp.Expr]]
+"""For each sign what one unit of it adds to each rate."""
+
+
+def _may_be_held(sign: sp.Expr, state: Sequence[sp.Symbol], push: Sequence[sp.Expr]) -> bool:
+    """Return True if the sign changes the rate of its own level; otherwise motion can only cross its surface."""
+    felt = sp.Add(*(derivative(sign.args[0], x) * g for x, g in zip(state, push, strict=True)))
+    return bool(sp.simplify(felt) != 0)
+
+
+def _refuse_products(held: Sequence[sp.Expr], swap: Mapping[sp.Expr, sp.Symbol], pushes: Pushes) -> None:
     for sign in held:
         other = next((each for each in held if each is not sign and any(e.has(swap[each]) for e in pushes[sign])), None)
         if other is not None:
@@ -45,21 +62,12 @@ def sliding_surfaces(state: Sequence[sp.Symbol], rates: Sequence[sp.Expr]) -> tu
                 f"sliding along {sign.args[0]} = 0 and {other.args[0]} = 0 at once is not defined by {sign}*{other}; write a "
                 "sum, or contact='sign'"
             )
-    # a sign along which motion can only cross is a row as well, unless a product holds it
-    crossed = [
-        sign
-        for sign in signs
-        if sign not in held
-        and not any(e.has(swap[sign]) for push in pushes.values() for e in push)
-        and not any(e.has(*swap.values()) for e in pushes[sign])
-    ]
-    held += crossed
-    for sign in held:
-        s = swap[sign]
-        smooth = [(e.xreplace({s: sp.S.One}) + e.xreplace({s: sp.S.NegativeOne})) / 2 for e in smooth]
-    back = {s: sign for sign, s in swap.items()}
-    surfaces = [Surface(Law.SIGN, sign.args[0], tuple(e.xreplace(back) for e in pushes[sign])) for sign in held]
-    return tuple(sp.expand(e).xreplace(back) for e in smooth), surfaces
+
+
+def _stands_alone(sign: sp.Expr, swap: Mapping[sp.Expr, sp.Symbol], pushes: Pushes) -> bool:
+    """Return True if no product contains the sign: it is then a row as well, which motion crosses."""
+    others = any(e.has(swap[sign]) for push in pushes.values() for e in push)
+    return not others and not any(e.has(*swap.values()) for e in pushes[sign])
 
 
 def _by_sign(*pieces: tuple[sp.Expr, sp.Basic]) -> sp.Expr:
