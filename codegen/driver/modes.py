@@ -230,6 +230,57 @@ def load_strengths(strengths, places, modes, kinds):
                 modes.strengths[(kinds * register + k) * LANES + lane] = strengths[k, register * LANES + lane]
 
 
+@njit(error_model="numpy")
+def note_track(track, y, moved, size, count):
+    """Write the state and the deviations at the beginning of a batch."""
+    for c in range(size):
+        track[c] = y[c]
+    for k in range(count):
+        track[size + k] = moved[k]
+
+
+@njit(error_model="numpy")
+def turn_phase(cell, plan, spans, y, size):
+    """Write the phase with which the next block of a frame begins."""
+    if plan.size and plan[SHIFT] >= 0:
+        y[size + plan[SHIFT]] = plan[NEXT] * spans[cell, 1]
+        plan[NEXT] = (plan[NEXT] + 1) % plan[PARTS]
+
+
+@njit(error_model="numpy")
+def end_block_of_frame(cell, old, growth, gains, framing, orbit, modes, dims):
+    """Make the directions of a frame orthogonal, and add the growth of directions and volume to `gains`."""
+    (plan, frame), parts, vectors = framing, modes.parts, modes.vectors
+    hand_back(old, modes.powers, modes.registers, vectors[cell], growth[cell], parts)
+    stride = modes.registers * LANES
+    lengths, products = address(frame, LENGTHS * frame.shape[1]), address(frame, PRODUCTS * frame.shape[1])
+    orthogonalise(address(vectors, cell * parts * stride), parts, stride, frame.shape[1], lengths, products)
+    volume = drain(orbit.y, dims.dimension, plan[VOLUMES])
+    whole = plan[VOLUMES] > 0 and frame.shape[1] == parts
+    close_block(growth[cell], volume, whole, orbit.control, frame, gains)
+
+
+@njit(error_model="numpy")
+def end_batch(at, goes_on, carried, modes, nodes, panels, travellers, legs):
+    """Write the growth of the deviations to `at` and begin the next batch at unit length; return the error."""
+    error = 0.0
+    if CONTACTS:  # noqa: SIM102
+        if legs.panels.shape[0] > 0:
+            if carried.parted and goes_on:
+                # between two landings the components that the last one has left are enough
+                close_batch(travellers, at)
+                return error, carried
+            if not carried.fresh:
+                error = bring(carried.parted, carried.old, modes, nodes, panels, travellers, legs)
+                old, new, _, parted, landed, cut_at = carried
+                carried = Carried(old, new, not parted, parted, landed, cut_at)
+    settle(
+        travellers.moved, travellers.lifts, travellers.groups, at, modes.parts, travellers.kept, travellers.kept_powers,
+        carried.parted,
+    )  # fmt: skip
+    return error, carried
+
+
 @njit(error_model="numpy", nogil=True, cache=True)
 def march(functions, dims, first, last, inputs, deviations, outputs, propagation, framing):
     """Run the cells first … last-1, each an orbit with all modes.
@@ -314,10 +365,7 @@ def march(functions, dims, first, last, inputs, deviations, outputs, propagation
         )
         for batch in range(batches.size):
             if tracks.shape[1]:
-                for c in range(size):
-                    tracks[cell, batch, c] = y[c]
-                for k in range(groups * parts * LANES):
-                    tracks[cell, batch, size + k] = moved[k]
+                note_track(tracks[cell, batch], y, moved, size, groups * parts * LANES)
             # 3. Blocks of time; after each, propagators move the deviations of all strengths.
             for _ in range(batches[batch]):
                 if status != FINISHED:
@@ -325,9 +373,7 @@ def march(functions, dims, first, last, inputs, deviations, outputs, propagation
                 if begun:
                     renew(cell, spans, control, clock)
                 begun = True
-                if plan.size and plan[SHIFT] >= 0:
-                    y[size + plan[SHIFT]] = plan[NEXT] * spans[cell, 1]
-                    plan[NEXT] = (plan[NEXT] + 1) % plan[PARTS]
+                turn_phase(cell, plan, spans, y, size)
                 status, carried = run_block(
                     cell, carried, rows, misfits, modes, orbit, nodes, panels, travellers, legs, dims, functions
                 )
@@ -340,15 +386,7 @@ def march(functions, dims, first, last, inputs, deviations, outputs, propagation
                         error = apply_propagators(carried.old, modes, nodes, panels, travellers)
                         misfits[cell] = larger(misfits[cell], error)
                 if plan.size:
-                    hand_back(carried.old, powers, registers, vectors[cell], growth[cell], parts)
-                    directions = address(vectors, cell * parts * stride)
-                    lengths, products = (
-                        address(frame, LENGTHS * frame.shape[1]),
-                        address(frame, PRODUCTS * frame.shape[1]),
-                    )
-                    orthogonalise(directions, parts, stride, frame.shape[1], lengths, products)
-                    volume, whole = drain(y, size, plan[VOLUMES]), plan[VOLUMES] > 0 and frame.shape[1] == parts
-                    close_block(growth[cell], volume, whole, control, frame, gains[cell, batch])
+                    end_block_of_frame(cell, carried.old, growth, gains[cell, batch], (plan, frame), orbit, modes, dims)
                 if CONTACTS:  # noqa: SIM102
                     if carried.parted:
                         misfits[cell] = larger(misfits[cell], hand_over(panels, travellers, legs))
@@ -357,17 +395,9 @@ def march(functions, dims, first, last, inputs, deviations, outputs, propagation
             # 4. The end of a batch: growth of the deviations, which begin the next one at unit length.
             if panel_rows.shape[0]:
                 at = address(gains, (cell * batches.size + batch) * groups * LANES)
-                if CONTACTS:
-                    if sticks and carried.parted and batch < batches.size - 1 and not tracks.shape[1]:
-                        close_batch(travellers, at)
-                        continue
-                    if sticks and not carried.fresh:
-                        error = bring(carried.parted, carried.old, modes, nodes, panels, travellers, legs)
-                        misfits[cell] = larger(misfits[cell], error)
-                        carried = Carried(
-                            carried.old, carried.new, not carried.parted, carried.parted, carried.landed, carried.cut_at
-                        )
-                settle(moved, lifts, groups, at, parts, kept, kept_powers, carried.parted)
+                goes_on = batch < batches.size - 1 and not tracks.shape[1]
+                error, carried = end_batch(at, goes_on, carried, modes, nodes, panels, travellers, legs)
+                misfits[cell] = larger(misfits[cell], error)
         # 5. The end of the cell.
         if not panel_rows.shape[0] and not plan.size:
             hand_back(carried.old, powers, registers, vectors[cell], growth[cell], parts)
