@@ -18,7 +18,7 @@ from .rows import OF_SIGN, number
 
 @njit(error_model="numpy")
 def begin_events_of_modes(old, modes, orbit, dims, functions):
-    """Let deviations begin along the surfaces of what is held; return True if a contact sticks, which begins a leg."""
+    """Let deviations begin along the surfaces of what is held; return True if a contact sticks, which begins an interval."""
     for register in range(modes.registers):
         functions.saltate(dims.rows, orbit.clock[TIME], orbit.y, orbit.y, modes.strengths, old, register)
     sticks = False

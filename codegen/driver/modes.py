@@ -20,10 +20,18 @@ from .control import accept_series, advance, aim, arrive, judge, pause, wrap
 from .dense import inside
 from .event_modes import begin_events_of_modes, pass_events
 from .frames import GONE, LENGTHS, NEXT, PARTS, PRODUCTS, SHIFT, VOLUMES, close_block, drain, orthogonalise
-from .landings import begin_leg, begin_products, bring, close_batch, hand_over, land, lay_out
 from .passages import note_rush, take_back
 from .propagators import TILE, TO, apply, larger, scale, settle, tabulate
 from .records import *
+from .stick_intervals import (
+    apply_products,
+    begin_interval,
+    begin_products,
+    close_batch,
+    end_interval,
+    interpolate_all,
+    lay_out,
+)
 
 # --- kernel text below ---
 # Steps between two scalings: a step's growth is bounded by its error, that of so many stays far from overflow.
@@ -126,32 +134,32 @@ def begin_deviations(cell, old, modes, orbit, dims, functions):
 
 
 @njit(error_model="numpy")
-def cut_leg(carried, modes, nodes, panels, travellers, legs):
-    """End a leg at a landing, or propagators that have become too long; return the error and the deviations to go on with."""
-    old, new, _, parted, landed, cut_at = carried
+def cut_interval(carried, modes, nodes, panels, targets, stick):
+    """End an interval at a landing, or propagators that have become too long; return the error and the deviations to go on with."""
+    old, new, _, in_interval, landed, cut_at = carried
     error, fresh = 0.0, False
-    if landed and parted:
+    if landed and in_interval:
         lay_out(old, modes.powers, modes.node_registers, nodes)
-        error = land(nodes, legs)
+        error = end_interval(nodes, stick)
     else:
-        error = bring(parted, old, modes, nodes, panels, travellers, legs)
-        fresh, parted = not landed, False
+        error = interpolate_all(in_interval, old, modes, nodes, panels, targets, stick)
+        fresh, in_interval = not landed, False
     if landed:
-        if not parted:
-            begin_products(travellers, legs)
-        begin_leg(old, modes.powers, modes.node_registers)
-        parted = True
-    return error, Carried(old, new, fresh, parted, False, cut_at)
+        if not in_interval:
+            begin_products(targets, stick)
+        begin_interval(old, modes.powers, modes.node_registers)
+        in_interval = True
+    return error, Carried(old, new, fresh, in_interval, False, cut_at)
 
 
 @njit(error_model="numpy")
 def take_step(taken, carried, modes, orbit, dims, functions):
     """Take one step; return the number of accepted ones, the largest modulus of the state, and the deviations."""
-    old, new, fresh, parted, landed, cut_at = carried
+    old, new, fresh, in_interval, landed, cut_at = carried
     clock, y = orbit.clock, orbit.y
-    active = modes.node_registers if parted else modes.registers
-    strengths = modes.node_strengths if parted else modes.strengths
-    still = parted and y[2 * dims.nodes] == 0.0  # a deviation of a body that sticks is constant
+    active = modes.node_registers if in_interval else modes.registers
+    strengths = modes.node_strengths if in_interval else modes.strengths
+    still = in_interval and y[2 * dims.nodes] == 0.0  # a deviation of a body that sticks is constant
     moving, t = 0 if still else active, load(clock, TIME, WIDTH)
     h, accept = attempt(t, strengths, old, new, moving, orbit, modes.tolerance, dims, functions)
     t_new = arrive(clock, t, h)
@@ -167,11 +175,11 @@ def take_step(taken, carried, modes, orbit, dims, functions):
         landed = pass_events(accept, t_new, strengths, old, active, modes, orbit, dims, functions) or landed
     if SERIES:
         wrap(clock)
-    return taken, largest, Carried(old, new, fresh, parted, landed, cut_at)
+    return taken, largest, Carried(old, new, fresh, in_interval, landed, cut_at)
 
 
 @njit(error_model="numpy")
-def run_block(cell, carried, rows, misfits, modes, orbit, nodes, panels, travellers, legs, dims, functions):
+def run_block(cell, carried, rows, errors, modes, orbit, nodes, panels, targets, stick, dims, functions):
     """Integrate over one block of time; return the status of the orbit and the deviations."""
     clock, y, taken = orbit.clock, orbit.y, 0
     status = outcome(0, clock, y, rows.control, dims)
@@ -181,13 +189,13 @@ def run_block(cell, carried, rows, misfits, modes, orbit, nodes, panels, travell
             sticks = begin_deviations(cell, carried.old, modes, orbit, dims, functions)
             carried = Carried(carried.old, carried.new, False, False, carried.landed or sticks, carried.cut_at)
         if CONTACTS:  # noqa: SIM102  (Numba leaves out what a constant excludes)
-            if legs.panels.shape[0] > 0:
+            if stick.panels.shape[0] > 0:
                 now = clock[BASE] + clock[TIME]
                 long = now - carried.cut_at > rows.spans[cell, 1] and y[2 * dims.nodes] != 0.0
                 if carried.landed or long:
-                    error, cut = cut_leg(carried, modes, nodes, panels, travellers, legs)
-                    carried = Carried(cut.old, cut.new, cut.fresh, cut.parted, False, now)
-                    misfits[cell] = larger(misfits[cell], error)
+                    error, cut = cut_interval(carried, modes, nodes, panels, targets, stick)
+                    carried = Carried(cut.old, cut.new, cut.fresh, cut.in_interval, False, now)
+                    errors[cell] = larger(errors[cell], error)
         # 2. end here, so that a landing in the last step is cut
         if status != 0:
             break
@@ -204,16 +212,16 @@ def run_block(cell, carried, rows, misfits, modes, orbit, nodes, panels, travell
 
 
 @njit(error_model="numpy")
-def apply_propagators(old, modes, nodes, panels, travellers):
+def apply_propagators(old, modes, nodes, panels, targets):
     """Move the deviations of all strengths by the propagators of a block; return the error of the interpolation."""
     columns, parts = nodes.columns, nodes.parts
     scale(old, modes.powers, modes.registers, parts)
     tabulate(old, modes.powers, nodes.places, nodes.nodes, columns, nodes.table, nodes.exponents, parts, nodes.stride)
     error = apply(
-        panels.panels, panels.weights, nodes.table, nodes.exponents, travellers.moved, travellers.lifts,
-        travellers.found, columns, parts, nodes.stride,
+        panels.panels, panels.weights, nodes.table, nodes.exponents, targets.moved, targets.lifts,
+        targets.found, columns, parts, nodes.stride,
     )  # fmt: skip
-    scale(travellers.moved, travellers.lifts, travellers.groups, parts)
+    scale(targets.moved, targets.lifts, targets.groups, parts)
     return error
 
 
@@ -231,12 +239,12 @@ def load_strengths(strengths, places, modes, kinds):
 
 
 @njit(error_model="numpy")
-def note_track(track, y, moved, size, count):
+def note_start(batch_start, y, moved, size, count):
     """Write the state and the deviations at the beginning of a batch."""
     for c in range(size):
-        track[c] = y[c]
+        batch_start[c] = y[c]
     for k in range(count):
-        track[size + k] = moved[k]
+        batch_start[size + k] = moved[k]
 
 
 @njit(error_model="numpy")
@@ -261,22 +269,22 @@ def end_block_of_frame(cell, old, growth, gains, framing, orbit, modes, dims):
 
 
 @njit(error_model="numpy")
-def end_batch(at, goes_on, carried, modes, nodes, panels, travellers, legs):
+def end_batch(at, goes_on, carried, modes, nodes, panels, targets, stick):
     """Write the growth of the deviations to `at` and begin the next batch at unit length; return the error."""
     error = 0.0
     if CONTACTS:  # noqa: SIM102
-        if legs.panels.shape[0] > 0:
-            if carried.parted and goes_on:
+        if stick.panels.shape[0] > 0:
+            if carried.in_interval and goes_on:
                 # between two landings the components that the last one has left are enough
-                close_batch(travellers, at)
+                close_batch(targets, at)
                 return error, carried
             if not carried.fresh:
-                error = bring(carried.parted, carried.old, modes, nodes, panels, travellers, legs)
-                old, new, _, parted, landed, cut_at = carried
-                carried = Carried(old, new, not parted, parted, landed, cut_at)
+                error = interpolate_all(carried.in_interval, carried.old, modes, nodes, panels, targets, stick)
+                old, new, _, in_interval, landed, cut_at = carried
+                carried = Carried(old, new, not in_interval, in_interval, landed, cut_at)
     settle(
-        travellers.moved, travellers.lifts, travellers.groups, at, modes.parts, travellers.kept, travellers.kept_powers,
-        carried.parted,
+        targets.moved, targets.lifts, targets.groups, at, modes.parts, targets.kept, targets.kept_powers,
+        carried.in_interval,
     )  # fmt: skip
     return error, carried
 
@@ -297,13 +305,13 @@ def march(functions, dims, first, last, inputs, deviations, outputs, propagation
     its start; the orbit goes on.  Without panels there is one block, and vectors are overwritten by the deviations at its
     end at unit length, growth by the logarithm of the length at the end, -inf for a deviation that has become zero.  With
     panels, places (nodes, columns) are the modes whose deviations are the columns of a propagator; panels and weights as
-    in `propagators`.  travellers (cells, registers of strengths * mode * LANES) are deviations of unit length that the
+    in `propagators`.  targets (cells, registers of strengths * mode * LANES) are deviations of unit length that the
     propagators move from block to block; gains (cells, batches, strengths) are filled with the logarithm of their growth
-    over each batch, misfits (cells) with the largest error of the interpolation.
-    legs, shares (any): of bodies that stick, panels and weights that give the nodes of `panels` from the nodes that are
+    over each batch, errors (cells) with the largest error of the interpolation.
+    intervals, shares (any): of bodies that stick, panels and weights that give the nodes of `panels` from the nodes that are
     integrated; where (nodes of panels): their places in registers.  Deviations are cut at landings then, not at the ends of
     blocks; every block of time they are moved to all strengths.
-    tracks (cells, batches, any), or none: filled with the state and the deviations at the beginning of each batch.
+    batch_starts (cells, batches, any), or none: filled with the state and the deviations at the beginning of each batch.
 
     frame: plan (4) and frame (4, count), see `frames`, or none.  The first `count` deviations of a single cell are made
     orthogonal after each block; vectors are overwritten by the last ones.  gains (1, batches, count + 1) are filled with
@@ -313,7 +321,9 @@ def march(functions, dims, first, last, inputs, deviations, outputs, propagation
     start, values, spans, control = inputs
     strengths, vectors, growth = deviations
     end, sums, counts = outputs
-    batches, places, panel_rows, weights, moving, gains, misfits, leg_rows, shares, where, tracks = propagation
+    batches, places, panel_rows, weights, moving, gains, errors, interval_rows, shares, where, batch_starts = (
+        propagation
+    )
     plan, frame = framing
     rows, panels = Rows(start, values, spans, control), Panels(panel_rows, address(weights, 0))
 
@@ -333,7 +343,10 @@ def march(functions, dims, first, last, inputs, deviations, outputs, propagation
     # 2. Workspace of the deviations, in registers.
     registers, parts, columns = growth.shape[1] // LANES, vectors.shape[1], places.shape[1]
     stride, groups = registers * LANES, 0 if plan.size else gains.shape[2] // LANES
-    sticks, room = leg_rows.shape[0] > 0, int(leg_rows[leg_rows.shape[0] - 1, TO]) * LANES if leg_rows.shape[0] else 0
+    sticks, room = (
+        interval_rows.shape[0] > 0,
+        int(interval_rows[interval_rows.shape[0] - 1, TO]) * LANES if interval_rows.shape[0] else 0,
+    )
     held = registers * (2 * parts + 2 + 2 * max(1, kinds) + columns * parts) + 3 * groups
     memory = aligned((held + parts * (1 + TILE * columns)) * LANES + 9 * room)
     old, new = address(memory, 0), address(memory, registers * parts * LANES)
@@ -353,19 +366,19 @@ def march(functions, dims, first, last, inputs, deviations, outputs, propagation
     tolerance = control[RTOL] * control[LOOSENESS]
     modes = Modes(vectors, parts, tolerance, plan.size > 0, registers, few, powers, mode_strengths, node_strengths)
     nodes = Propagators(table, exponents, stride, address(places, 0), count, columns, parts)
-    legs = Legs(leg_rows, address(shares, 0), where, share, share_powers, fine, heights, work)
+    stick = StickIntervals(interval_rows, address(shares, 0), where, share, share_powers, fine, heights, work)
     load_strengths(strengths, places, modes, kinds)
 
     for cell in range(first, last):
         fill(0, cell, rows, clock, y, dims)
         status, begun, moved = FINISHED, False, address(moving, cell * groups * parts * LANES)
-        travellers, carried = (
-            Travellers(groups, moved, lifts, found, kept, kept_powers),
+        targets, carried = (
+            Targets(groups, moved, lifts, found, kept, kept_powers),
             Carried(old, new, True, False, False, 0.0),
         )
         for batch in range(batches.size):
-            if tracks.shape[1]:
-                note_track(tracks[cell, batch], y, moved, size, groups * parts * LANES)
+            if batch_starts.shape[1]:
+                note_start(batch_starts[cell, batch], y, moved, size, groups * parts * LANES)
             # 3. Blocks of time; after each, propagators move the deviations of all strengths.
             for _ in range(batches[batch]):
                 if status != FINISHED:
@@ -375,7 +388,7 @@ def march(functions, dims, first, last, inputs, deviations, outputs, propagation
                 begun = True
                 turn_phase(cell, plan, spans, y, size)
                 status, carried = run_block(
-                    cell, carried, rows, misfits, modes, orbit, nodes, panels, travellers, legs, dims, functions
+                    cell, carried, rows, errors, modes, orbit, nodes, panels, targets, stick, dims, functions
                 )
                 counts[cell, N_ACCEPTED] += int(clock[ACCEPTED])
                 counts[cell, N_REJECTED] += int(clock[REJECTED])
@@ -383,21 +396,21 @@ def march(functions, dims, first, last, inputs, deviations, outputs, propagation
                 if not sticks:
                     fresh = True
                     if panel_rows.shape[0]:
-                        error = apply_propagators(carried.old, modes, nodes, panels, travellers)
-                        misfits[cell] = larger(misfits[cell], error)
+                        error = apply_propagators(carried.old, modes, nodes, panels, targets)
+                        errors[cell] = larger(errors[cell], error)
                 if plan.size:
                     end_block_of_frame(cell, carried.old, growth, gains[cell, batch], (plan, frame), orbit, modes, dims)
                 if CONTACTS:  # noqa: SIM102
-                    if carried.parted:
-                        misfits[cell] = larger(misfits[cell], hand_over(panels, travellers, legs))
+                    if carried.in_interval:
+                        errors[cell] = larger(errors[cell], apply_products(panels, targets, stick))
                 cut_at = carried.cut_at - (clock[BASE] + clock[TIME])
-                carried = Carried(carried.old, carried.new, fresh, carried.parted, carried.landed, cut_at)
+                carried = Carried(carried.old, carried.new, fresh, carried.in_interval, carried.landed, cut_at)
             # 4. The end of a batch: growth of the deviations, which begin the next one at unit length.
             if panel_rows.shape[0]:
                 at = address(gains, (cell * batches.size + batch) * groups * LANES)
-                goes_on = batch < batches.size - 1 and not tracks.shape[1]
-                error, carried = end_batch(at, goes_on, carried, modes, nodes, panels, travellers, legs)
-                misfits[cell] = larger(misfits[cell], error)
+                goes_on = batch < batches.size - 1 and not batch_starts.shape[1]
+                error, carried = end_batch(at, goes_on, carried, modes, nodes, panels, targets, stick)
+                errors[cell] = larger(errors[cell], error)
         # 5. The end of the cell.
         if not panel_rows.shape[0] and not plan.size:
             hand_back(carried.old, powers, registers, vectors[cell], growth[cell], parts)

@@ -171,24 +171,24 @@ def node_entries(register, count, panel, table, entries, stride, scratch):
 
 
 @njit(error_model="numpy")
-def product(first, k, travellers, scratch, columns, parts):
+def product(first, k, targets, scratch, columns, parts):
     """Apply the propagators of register k of `scratch` to the deviations of one register."""
     moved = address(scratch, TILE * columns * parts * LANES)
     for r in range(columns):
         real, imaginary = broadcast(0.0, LANES), broadcast(0.0, LANES)
         for c in range(columns):
-            a, x = load(scratch, TILE * (parts * c + r) + k, LANES), load(travellers, first + c, LANES)
+            a, x = load(scratch, TILE * (parts * c + r) + k, LANES), load(targets, first + c, LANES)
             real = fma(a, x, real)
             if parts > columns:
                 b, y = (
-                    load(scratch, TILE * (parts * c + columns + r) + k, LANES), load(travellers, first + columns + c, LANES)
+                    load(scratch, TILE * (parts * c + columns + r) + k, LANES), load(targets, first + columns + c, LANES)
                 )  # fmt: skip
                 real, imaginary = fma(-b, y, real), fma(a, y, fma(b, x, imaginary))
         store(moved, r, real)
         if parts > columns:
             store(moved, columns + r, imaginary)
     for r in range(parts):
-        store(travellers, first + r, load(moved, r, LANES))
+        store(targets, first + r, load(moved, r, LANES))
 
 
 @njit(error_model="numpy")
@@ -203,7 +203,7 @@ def lift(panel, exponents, powers):
 
 
 @njit(error_model="numpy")
-def transport(panel, weights, table, exponents, travellers, lifts, scratch, columns, parts, stride):
+def transport(panel, weights, table, exponents, targets, lifts, scratch, columns, parts, stride):
     """Apply the propagators of one panel to the deviations of its strengths; powers of two are counted in `lifts`.
 
     `scratch` has room for the propagators of TILE registers, and for one deviation behind them.
@@ -218,7 +218,7 @@ def transport(panel, weights, table, exponents, travellers, lifts, scratch, colu
             complex_entries(register, count, panel, weights, table, columns, stride, scratch)
         for k in range(min(TILE, count - register)):
             s = int(panel[FROM]) + register + k
-            product(parts * s, k, travellers, scratch, columns, parts)
+            product(parts * s, k, targets, scratch, columns, parts)
     lift(panel, exponents, lifts)
 
 
@@ -235,12 +235,12 @@ def largest_misfit(panels, weights, table, exponents, columns, rows, kinds, stri
 
 
 @njit(error_model="numpy")
-def apply(panels, weights, table, exponents, travellers, lifts, scratch, columns, parts, stride):
+def apply(panels, weights, table, exponents, targets, lifts, scratch, columns, parts, stride):
     """Apply the propagators of all panels to the deviations; return the largest error of the interpolation."""
     worst = largest_misfit(panels, weights, table, exponents, columns, columns, parts // columns, stride)
     for k in range(panels.shape[0]):
         panel = address(panels, len(PANEL) * k)
-        transport(panel, weights, table, exponents, travellers, lifts, scratch, columns, parts, stride)
+        transport(panel, weights, table, exponents, targets, lifts, scratch, columns, parts, stride)
     return worst
 
 
@@ -272,7 +272,7 @@ def multiply(panel, weights, factors, products):
 
 
 @njit(error_model="numpy")
-def settle(travellers, lifts, registers, gains, parts, kept, kept_powers, follow):
+def settle(targets, lifts, registers, gains, parts, kept, kept_powers, follow):
     """Give all deviations unit length, and write the logarithms of how much they have grown; zeros stay zeros.
 
     If `follow`, the components at the last landing are scaled alike.
@@ -280,14 +280,14 @@ def settle(travellers, lifts, registers, gains, parts, kept, kept_powers, follow
     for s in range(registers):
         square = broadcast(0.0, LANES)
         for r in range(parts):
-            value = load(travellers, parts * s + r, LANES)
+            value = load(targets, parts * s + r, LANES)
             square = fma(value, value, square)
         length, power = sqrt(square), load(lifts, s, LANES)
         store(gains, s, power * 0.6931471805599453 + log(length))
         store(lifts, s, broadcast(0.0, LANES))
         scaled = 1.0 / select(length > 0.0, length, 1.0)
         for r in range(parts):
-            store(travellers, parts * s + r, scaled * load(travellers, parts * s + r, LANES))
+            store(targets, parts * s + r, scaled * load(targets, parts * s + r, LANES))
         if follow:
             store(kept, s, scaled * load(kept, s, LANES))
             store(kept_powers, s, load(kept_powers, s, LANES) - power)

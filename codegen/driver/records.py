@@ -112,7 +112,7 @@ class Carried(NamedTuple):
     old: Any  # addresses of the deviations at the beginning and at the end of a step
     new: Any
     fresh: Any  # True if the deviations must begin from `Modes.vectors`
-    parted: Any  # True between two landings, with one deviation for each node
+    in_interval: Any  # True between two landings, with one deviation for each node
     landed: Any  # True if a body has begun to stick in the last step
     cut_at: Any  # time of the last cut, from the beginning of the block
 
@@ -136,7 +136,7 @@ class Panels(NamedTuple):
     weights: Any
 
 
-class Travellers(NamedTuple):
+class Targets(NamedTuple):
     """Deviations of all strengths, in registers; all but `groups` are addresses."""
 
     groups: Any  # registers
@@ -147,13 +147,13 @@ class Travellers(NamedTuple):
     kept_powers: Any
 
 
-class Legs(NamedTuple):
+class StickIntervals(NamedTuple):
     """Interpolation from the nodes that are integrated to the nodes of panels, of bodies that stick."""
 
     panels: Any
     weights: Any
     where: Any  # (nodes of panels): their places in registers
-    share: Any  # addresses from here: products of the factors of legs, and their powers of two
+    share: Any  # addresses from here: products of the factors of intervals, and their powers of two
     share_powers: Any
     fine: Any  # the same in the order of the nodes of panels
     heights: Any

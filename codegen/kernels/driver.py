@@ -110,7 +110,7 @@ class Driver:
             "SERIES": self.series,
         }
         of_contacts = ["gaps", *(["decisions", "rows"] if self.rows else ["contacts"]), "passages"]
-        contacts, landings = (of_contacts, ["landings", "event_modes"]) if self.contacts else ([], [])
+        contacts, landings = (of_contacts, ["stick_intervals", "event_modes"]) if self.contacts else ([], [])
         frames = ["frames", "lifted_frames"] if self.kind is KernelKind.FRAME else []
         last = ["propagators", *landings, "frames", "modes"] if modes else ["spread", "sweep", *frames]
         pieces = (f"driver.{name}" for name in ("dense", "cells", "control", *contacts, *last))

@@ -93,7 +93,7 @@ def _of_modes(driver: Driver) -> tuple[dict[str, Any], tuple[Any, ...], tuple[An
         "saltate": types.void(INTEGER, NUMBER, *[ADDRESS] * 4, INTEGER),
     }
     deviations, outputs = (READ_ONLY, CUBE, MATRIX), (MATRIX, MATRIX, COUNTS)
-    # batches, places, panels, weights, travellers, gains, misfits; legs, shares, where; tracks
+    # batches, places, panels, weights, targets, gains, errors; intervals, shares, where; batch_starts
     propagation = (CELLS, MATRIX, MATRIX, VECTOR, MATRIX, CUBE, VECTOR, MATRIX, VECTOR, VECTOR, CUBE)
     framing = (CELLS, MATRIX)  # plan, frame
     return taken, (_sizes(ModeDimensions),), (deviations, outputs, propagation, framing)

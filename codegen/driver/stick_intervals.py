@@ -1,9 +1,9 @@
-"""Deviations of bodies that stick: from one landing to the next a mode has a single number.
+"""Deviations of bodies that stick: between two landings a mode has a single number.
 
-The velocity of a deviation is lost where its contact sticks, so that a leg, the time between two landings, multiplies what
-is left of it by a number that is a smooth function of the strength. A leg is short, and few strengths are integrated to tell
-these numbers; they are interpolated to the nodes of all legs of some blocks, and multiplied there. The products are
-interpolated to all strengths.
+A contact that begins to stick takes the velocity of a deviation.  Each interval between two landings therefore multiplies
+the rest of the deviation by a number, a smooth function of the strength.  As intervals are short, the numbers are
+integrated for few strengths, the nodes of an interval.  They are interpolated to the nodes of the block and multiplied
+there over all intervals of the block; the products are interpolated to all strengths.
 """
 
 from __future__ import annotations
@@ -54,9 +54,9 @@ def gather(factors, where, out):
 
 
 @njit(error_model="numpy")
-def room_of(legs):
+def padded_count(stick):
     """Return the length of an array with a number for each node of panels, padded to registers."""
-    return int(legs.panels[legs.panels.shape[0] - 1, TO]) * LANES
+    return int(stick.panels[stick.panels.shape[0] - 1, TO]) * LANES
 
 
 @njit(error_model="numpy")
@@ -80,24 +80,24 @@ def multiply_all(panels, weights, factors, exponents, products, powers):
 
 
 @njit(error_model="numpy")
-def refine(nodes, legs):
+def refine(nodes, stick):
     """Write the propagators of the nodes of panels from those that are integrated; return the error."""
-    room, table, exponents, stride = room_of(legs), nodes.table, nodes.exponents, nodes.stride
+    room, table, exponents, stride = padded_count(stick), nodes.table, nodes.exponents, nodes.stride
     powers, worst = (
-        address(legs.work, room),
-        largest_misfit(legs.panels, legs.weights, table, exponents, 2, 2, 1, stride),
+        address(stick.work, room),
+        largest_misfit(stick.panels, stick.weights, table, exponents, 2, 2, 1, stride),
     )
     for slot in range(4):
-        fill_in(legs.work, room // LANES, 1.0)
+        fill_in(stick.work, room // LANES, 1.0)
         fill_in(powers, room // LANES, 0.0)
-        multiply_all(legs.panels, legs.weights, address(table, slot * stride), exponents, legs.work, powers)
-        gather(legs.work, legs.where, address(legs.fine, slot * room))
-    gather(powers, legs.where, legs.heights)
+        multiply_all(stick.panels, stick.weights, address(table, slot * stride), exponents, stick.work, powers)
+        gather(stick.work, stick.where, address(stick.fine, slot * room))
+    gather(powers, stick.where, stick.heights)
     return worst
 
 
 @njit(error_model="numpy")
-def begin_leg(modes, powers, registers):
+def begin_interval(modes, powers, registers):
     """Let the deviation of every node be 1 in the component that a landing leaves."""
     for register in range(registers):
         store(modes, 2 * register, broadcast(1.0, LANES))
@@ -106,38 +106,38 @@ def begin_leg(modes, powers, registers):
 
 
 @njit(error_model="numpy")
-def begin_products(travellers, legs):
-    """Let the products of legs begin at a landing, which has left one component of all deviations."""
-    for s in range(travellers.groups):
-        store(travellers.kept, s, load(travellers.moved, 2 * s, LANES))
-    copy(travellers.lifts, travellers.groups, travellers.kept_powers)
-    renew_products(travellers, legs)
+def begin_products(targets, stick):
+    """Let the products of intervals begin at a landing, which has left one component of all deviations."""
+    for s in range(targets.groups):
+        store(targets.kept, s, load(targets.moved, 2 * s, LANES))
+    copy(targets.lifts, targets.groups, targets.kept_powers)
+    renew_products(targets, stick)
 
 
 @njit(error_model="numpy")
-def renew_products(travellers, legs):
-    """Let the products of legs begin anew, and scale the components that are left of all strengths."""
-    scale(travellers.kept, travellers.kept_powers, travellers.groups, 1)
-    fill_in(legs.share, room_of(legs) // LANES, 1.0)
-    fill_in(legs.share_powers, room_of(legs) // LANES, 0.0)
+def renew_products(targets, stick):
+    """Let the products of intervals begin anew, and scale the components that are left of all strengths."""
+    scale(targets.kept, targets.kept_powers, targets.groups, 1)
+    fill_in(stick.share, padded_count(stick) // LANES, 1.0)
+    fill_in(stick.share_powers, padded_count(stick) // LANES, 0.0)
 
 
 @njit(error_model="numpy")
-def hand_over(panels, travellers, legs):
-    """Move the products of earlier legs to all strengths; return the error."""
-    gather(legs.share, legs.where, legs.fine)
-    gather(legs.share_powers, legs.where, legs.heights)
-    worst = largest_misfit(panels.panels, panels.weights, legs.fine, legs.heights, 1, 1, 1, room_of(legs))
-    multiply_all(panels.panels, panels.weights, legs.fine, legs.heights, travellers.kept, travellers.kept_powers)
-    renew_products(travellers, legs)
+def apply_products(panels, targets, stick):
+    """Move the products of earlier intervals to all strengths; return the error."""
+    gather(stick.share, stick.where, stick.fine)
+    gather(stick.share_powers, stick.where, stick.heights)
+    worst = largest_misfit(panels.panels, panels.weights, stick.fine, stick.heights, 1, 1, 1, padded_count(stick))
+    multiply_all(panels.panels, panels.weights, stick.fine, stick.heights, targets.kept, targets.kept_powers)
+    renew_products(targets, stick)
     return worst
 
 
 @njit(error_model="numpy")
-def close_batch(travellers, gains):
+def close_batch(targets, gains):
     """Write the logarithms of the growth of the components that landings leave, and scale these to 1; zeros stay zeros."""
-    kept, kept_powers = travellers.kept, travellers.kept_powers
-    for s in range(travellers.groups):
+    kept, kept_powers = targets.kept, targets.kept_powers
+    for s in range(targets.groups):
         value = load(kept, s, LANES)
         store(gains, s, load(kept_powers, s, LANES) * 0.6931471805599453 + log(absolute(value)))
         store(kept, s, select(value > 0.0, 1.0, select(value < 0.0, -1.0, value)))
@@ -145,13 +145,13 @@ def close_batch(travellers, gains):
 
 
 @njit(error_model="numpy")
-def land(nodes, legs):
-    """End a leg: multiply the products of legs by its factors; return the error.
+def end_interval(nodes, stick):
+    """End an interval: multiply the products of intervals by its factors; return the error.
 
-    The powers of two of each leg are counted, so that the products stay within range.
+    The powers of two of each interval are counted, so that the products stay within range.
     """
-    worst = largest_misfit(legs.panels, legs.weights, nodes.table, nodes.exponents, 1, 1, 1, nodes.stride)
-    multiply_all(legs.panels, legs.weights, nodes.table, nodes.exponents, legs.share, legs.share_powers)
+    worst = largest_misfit(stick.panels, stick.weights, nodes.table, nodes.exponents, 1, 1, 1, nodes.stride)
+    multiply_all(stick.panels, stick.weights, nodes.table, nodes.exponents, stick.share, stick.share_powers)
     return worst
 
 
@@ -178,44 +178,46 @@ def multiply_twice(panel, weights, fine, room, products, out):
 
 
 @njit(error_model="numpy")
-def compose(nodes, panels, travellers, legs):
-    """Write the deviations of all strengths within a leg, from the components at its beginning; return the error."""
-    table, exponents, stride, room = nodes.table, nodes.exponents, nodes.stride, room_of(legs)
-    registers, powers = room // LANES, address(legs.work, room)
-    # 1. both components at the nodes of panels: products of earlier legs times the factors of this one
-    worst = largest_misfit(legs.panels, legs.weights, table, exponents, 1, 2, 1, stride)
+def compose(nodes, panels, targets, stick):
+    """Write the deviations of all strengths within an interval, from the components at its beginning; return the error."""
+    table, exponents, stride, room = nodes.table, nodes.exponents, nodes.stride, padded_count(stick)
+    registers, powers = room // LANES, address(stick.work, room)
+    # 1. both components at the nodes of panels: products of earlier intervals times the factors of this one
+    worst = largest_misfit(stick.panels, stick.weights, table, exponents, 1, 2, 1, stride)
     for slot in range(2):
-        copy(legs.share, registers, legs.work)
-        copy(legs.share_powers, registers, powers)
-        multiply_all(legs.panels, legs.weights, address(table, slot * stride), exponents, legs.work, powers)
-        gather(legs.work, legs.where, address(legs.fine, slot * room))
-    gather(powers, legs.where, legs.heights)
+        copy(stick.share, registers, stick.work)
+        copy(stick.share_powers, registers, powers)
+        multiply_all(stick.panels, stick.weights, address(table, slot * stride), exponents, stick.work, powers)
+        gather(stick.work, stick.where, address(stick.fine, slot * room))
+    gather(powers, stick.where, stick.heights)
     # 2. the same at all strengths
-    worst = larger(worst, largest_misfit(panels.panels, panels.weights, legs.fine, legs.heights, 1, 2, 1, room))
-    copy(travellers.kept_powers, travellers.groups, travellers.lifts)
+    worst = larger(worst, largest_misfit(panels.panels, panels.weights, stick.fine, stick.heights, 1, 2, 1, room))
+    copy(targets.kept_powers, targets.groups, targets.lifts)
     for k in range(panels.panels.shape[0]):
         panel = address(panels.panels, len(PANEL) * k)
-        multiply_twice(panel, panels.weights, legs.fine, room, travellers.kept, travellers.moved)
-        lift(panel, legs.heights, travellers.lifts)
+        multiply_twice(panel, panels.weights, stick.fine, room, targets.kept, targets.moved)
+        lift(panel, stick.heights, targets.lifts)
     return worst
 
 
 @njit(error_model="numpy")
-def bring(parted, old, modes, nodes, panels, travellers, legs):
+def interpolate_all(in_interval, old, modes, nodes, panels, targets, stick):
     """Write the present deviations of all strengths; return the error.
 
-    They come from the components that a landing has left, if `parted`, else from the deviations at the last cut.
+    They come from the components that a landing has left, if `in_interval`, else from the deviations at the last cut.
     """
-    moved, lifts, found = travellers.moved, travellers.lifts, travellers.found
-    if parted:
+    moved, lifts, found = targets.moved, targets.lifts, targets.found
+    if in_interval:
         lay_out(old, modes.powers, modes.node_registers, nodes)
-        worst = compose(nodes, panels, travellers, legs)
+        worst = compose(nodes, panels, targets, stick)
     else:
         tabulate(old, modes.powers, nodes.places, nodes.nodes, 2, nodes.table, nodes.exponents, 2, nodes.stride)
-        worst = refine(nodes, legs)
+        worst = refine(nodes, stick)
         worst = larger(
             worst,
-            apply(panels.panels, panels.weights, legs.fine, legs.heights, moved, lifts, found, 2, 2, room_of(legs)),
+            apply(
+                panels.panels, panels.weights, stick.fine, stick.heights, moved, lifts, found, 2, 2, padded_count(stick)
+            ),
         )
-    scale(moved, lifts, travellers.groups, 2)
+    scale(moved, lifts, targets.groups, 2)
     return worst
