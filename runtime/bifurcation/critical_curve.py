@@ -21,8 +21,8 @@ from .arclength import Point, Test
 from .kinds import BifurcationKind
 from .problems import BranchProblem, GrowthNumbers, Matrix
 
+# Largest entry of a critical vector, relative to the entry that is 1, before another entry is chosen (a choice).
 LARGEST = 2.0
-"""Largest entry of a critical vector, relative to the entry that is 1, before another entry is chosen (a choice)."""
 
 
 class CriticalEquations(NamedTuple):

@@ -34,11 +34,10 @@ from .periodic_result import PeriodicOrbit
 from .results import Bifurcation
 from .transversal import expansion
 
+# Largest part of the image of a mode's deviations that leaves the mode, relative to the image (a choice).
 ONE_MODE = 1e-6
-"""Largest part of the image of a mode's deviations that leaves the mode, relative to the image (a choice)."""
-
+# Largest distance from 1 of a multiplier that is 1 where the cycles vanish: the root of the errors there (a choice).
 AT_ONE = 1e-3
-"""Largest distance from 1 of a multiplier that is 1 where the cycles vanish: the root of the errors there (a choice)."""
 
 
 class CycleCurve(CriticalCurve):

@@ -45,52 +45,29 @@ from .problems import GrowthNumbers
 from .products import null_vectors, product_eigenvalues
 from .transversal import Transversal, expansion
 
-GROWTH = 1e3
-"""Largest growth of a deviation in a segment (a choice)."""
-
-MOST_SEGMENTS = 64
-"""Most segments of an undriven cycle (a choice)."""
-
-LOOKS = 16
-"""States on the orbit from which the extents of the motion are measured (a choice)."""
-
-RESCALED = 2.0
-"""The extents are measured again where the rates change by this factor (a choice)."""
-
+GROWTH = 1e3  # largest growth of a deviation in a segment (a choice)
+MOST_SEGMENTS = 64  # most segments of an undriven cycle (a choice)
+LOOKS = 16  # states on the orbit from which the extents of the motion are measured (a choice)
+RESCALED = 2.0  # the extents are measured again where the rates change by this factor (a choice)
+# Integration error of an image that counts as zero, in units of the tolerance and the size of the motion (a choice).
 NOISE = 0.3
-"""Integration error of an image that counts as zero, in units of the tolerance and the size of the motion (a choice)."""
-
-ROUNDING = 1e-10
-"""Error of the propagators, relative to the largest multiplier (a choice)."""
-
+ROUNDING = 1e-10  # error of the propagators, relative to the largest multiplier (a choice)
+# Most steps of Newton's method at fixed parameters, and how far it may go in units of the motion (choices).
 MOST_STEPS, ASTRAY = 30, 1e4
-"""Most steps of Newton's method at fixed parameters, and how far it may go in units of the motion (choices)."""
-
+# Cycles whose amplitude, or whose two halves' difference, is below this part of the motion are born there: the place
+# of birth is located to the square root of rounding (a choice).
 BORN = 1e-3
-"""Cycles whose amplitude, or whose two halves' difference, is below this part of the motion are born there: the place of
-birth is located to the square root of rounding (a choice)."""
-
+# A gap, in units of the motion, from which Newton's method must reduce it in every step under friction (a choice).
 NEAR = 1e-3
-"""A gap, in units of the motion, from which Newton's method must reduce it in every step under friction (a choice)."""
-
-ORIGIN = 1e-6
-"""Size of an equilibrium, relative to the start of its scene, that counts as zero (a choice)."""
-
-RIGID = 1e-6
-"""Part of the rates across the shifts below which a motion is a rigid rotation (a choice)."""
-
+ORIGIN = 1e-6  # size of an equilibrium, relative to the start of its scene, that counts as zero (a choice)
+RIGID = 1e-6  # part of the rates across the shifts below which a motion is a rigid rotation (a choice)
+# Singular values of a matrix of Newton's method that count as zero, relative to the largest: a conservative motion is
+# one of a family, to within the errors of the integration (a choice).
 SINGULAR = 1e-9
-"""Singular values of a matrix of Newton's method that count as zero, relative to the largest: a conservative motion is one
-of a family, to within the errors of the integration (a choice)."""
-
-CLOSE = 1e-9
-"""A gap, in units of the motion, at which a step of Newton's method is not halved (a choice)."""
-
+CLOSE = 1e-9  # a gap, in units of the motion, at which a step of Newton's method is not halved (a choice)
+# Smallest part of a step of Newton's method that is tried where the whole does not reduce the gap (a choice).
 SMALLEST_SHARE = 1.0 / 64.0
-"""Smallest part of a step of Newton's method that is tried where the whole does not reduce the gap (a choice)."""
-
-REAL = 1e-7
-"""Multipliers with a smaller imaginary part, relative to their modulus, count as real."""
+REAL = 1e-7  # multipliers with a smaller imaginary part, relative to their modulus, count as real
 
 
 @dataclass(slots=True)

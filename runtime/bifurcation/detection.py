@@ -232,7 +232,8 @@ def _found(step: BranchStep, indices: range, turned: bool) -> list[tuple[float, 
         if not near:
             # Of few eigenvalues of a large network one may pass although the number of growing ones stays the same.
             for beside in BESIDE:
-                sides = [_nearest(step.at(min(max(turn + d * length, 0.0), length))) for d in (-beside, beside)]
+                places = (min(max(turn + d * length, 0.0), length) for d in (-beside, beside))
+                sides = [min(critical_of(step.at(place)).growth, key=abs) for place in places]
                 if min(map(abs, sides)) > CLEAR * step.scale:
                     break
             kind = problem.kind(complex(critical.values[touching].real), sides[0] * sides[1] < 0.0)
@@ -250,12 +251,6 @@ def _found(step: BranchStep, indices: range, turned: bool) -> list[tuple[float, 
         else:
             joined.append((distance, each))
     return [*joined]
-
-
-def _nearest(point: Point) -> float:
-    """Return the growth nearest to zero."""
-    growth = critical_of(point).growth
-    return float(growth[abs(growth).argmin()])
 
 
 def _passing(step: BranchStep, indices: range, turn: float | None) -> Iterator[tuple[float, Located]]:

@@ -26,8 +26,7 @@ from .linearised import Linearised
 from .normal_forms import first_lyapunov_coefficient
 from .results import Bifurcation
 
-NOISE = 1e-13
-"""Residual of the equations of eigenvectors that counts as zero, relative to their terms (a choice)."""
+NOISE = 1e-13  # residual of the equations of eigenvectors that counts as zero, relative to their terms (a choice)
 
 
 class EquilibriumCurve(CriticalCurve):

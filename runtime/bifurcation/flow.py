@@ -25,7 +25,7 @@ from synchain.codegen.machine_code.compile import load
 from synchain.models.dynamics.angles import periods_of_states
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.lift import Lift, lifted
-from synchain.models.dynamics.variational import PHASE, Variation, clock_shifted, network_variation
+from synchain.models.dynamics.variational import PHASE, clock_shifted, network_variation
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
 
@@ -41,15 +41,14 @@ from ..stability.variational_integrator import VariationalIntegrator
 from ..support.status import Status
 from .linearised import Linearised
 
-TOLERANCE = 1e-12
-"""Relative tolerance of the integration (a choice)."""
-
+TOLERANCE = 1e-12  # relative tolerance of the integration (a choice)
+# The absolute tolerance is TOLERANCE times LEAST times the scale of the component with the least scale (a choice).
 LEAST = 1e-3
-"""The absolute tolerance is TOLERANCE times LEAST times the scale of the component with the least scale (a choice)."""
+
+STICKS = 10.0  # a sliding velocity below this many integration errors is zero (a choice)
 
 
-STICKS = 10.0
-"""A sliding velocity below this many integration errors is zero (a choice)."""
+_lift, _contact_variation = lru_cache(maxsize=32)(lifted), lru_cache(maxsize=32)(network_variation)
 
 
 class Image(NamedTuple):
@@ -93,8 +92,20 @@ def flow_of(scene: Scene, equations: Equations, names: Sequence[str], state: np.
     if equations.sticks:
         shifted = clock_shifted(equations) if begin else equations
         return ContactFlow(scene, shifted, present, tuple(names), equations.continuous_dimension, begin)
-    lift, job = _job(scene.replace(rtol=TOLERANCE, atol=None), equations, present, tuple(map(float, state)))
-    return LiftedFlow(equations, lift, job, present, tuple(names), equations.dimension, _linearised(equations))
+    # The network at the beginning of a period of the drive.
+    still = equations
+    if equations.forced:
+        begin_at: dict[sp.Expr, sp.Expr] = {TIME: sp.S.Zero}
+        still = equations.map_templates(
+            lambda node: node.map(lambda e: e.xreplace(begin_at)), lambda edge: edge.map(lambda e: e.xreplace(begin_at))
+        )
+    network = Linearised.of(still, dict.fromkeys(still.parameters, 1.0))
+    # The integrator for the motion from the state.
+    scene, lift, at = scene.replace(rtol=TOLERANCE, atol=None), _lift(equations, present), state[None].astype(float)
+    seeds = np.zeros((1, len(present)))
+    rows = _rows(lift, _row(lift, scene.parameters), present, at, np.ones_like(at), seeds, np.ones(1))
+    job = _compiled(lift.equations, chosen_for_rows(scene, lift.equations, rows), scene.max_steps)
+    return LiftedFlow(equations, lift, job, present, tuple(names), equations.dimension, network)
 
 
 @dataclass(slots=True)
@@ -231,30 +242,6 @@ def _rows(
 
 
 @lru_cache(maxsize=32)
-def _linearised(equations: Equations) -> Linearised:
-    """Compile the rates at time 0; `at` gives the numbers of the parameters."""
-
-    def start(e: sp.Expr) -> sp.Expr:
-        return e.xreplace({TIME: sp.S.Zero})
-
-    still = equations.map_templates(lambda node: node.map(start), lambda edge: edge.map(start))
-    return Linearised.of(still, dict.fromkeys(still.parameters, 1.0))
-
-
-@lru_cache(maxsize=32)
-def _lift(equations: Equations, names: tuple[str, ...]) -> Lift:
-    return lifted(equations, names)
-
-
-def _job(scene: Scene, equations: Equations, names: tuple[str, ...], state: tuple[float, ...]) -> tuple[Lift, RowsJob]:
-    """Return a lift and the job that integrates it, with the integrator for the motion from a state."""
-    lift, q = _lift(equations, names), len(names)
-    at = np.array([state])
-    rows = _rows(lift, _row(lift, scene.parameters), names, at, np.ones_like(at), np.zeros((1, q)), np.ones(1))
-    return lift, _compiled(lift.equations, chosen_for_rows(scene, lift.equations, rows), scene.max_steps)
-
-
-@lru_cache(maxsize=32)
 def _compiled(equations: Equations, method: Integrator, max_steps: int) -> RowsJob:
     """Return the job of a lifted network."""
     control = control_array(TOLERANCE, LEAST * TOLERANCE, math.inf, max_steps, jumps=False)
@@ -358,11 +345,6 @@ class ContactFlow:
         moved = np.zeros((m, n, len(self.names)))
         moved[:, :, [self.names.index(name) for name in self.present]] = matrices[:, :n, n:]
         return Image(integrator.state[:, :n], matrices[:, :n, :n], moved)
-
-
-@lru_cache(maxsize=32)
-def _contact_variation(equations: Equations, names: tuple[str, ...]) -> Variation:
-    return network_variation(equations, names)
 
 
 @lru_cache(maxsize=32)

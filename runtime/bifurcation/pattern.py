@@ -7,11 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-ALIKE = 1e-6
-"""Largest difference of two motions that count as one, relative to the extent of the motion (a choice)."""
-
-FEW = 12
-"""Most nodes that are listed."""
+ALIKE = 1e-6  # largest difference of two motions that count as one, relative to the extent of the motion (a choice)
+FEW = 12  # most nodes that are listed
 
 
 def pattern_of(motion: np.ndarray, labels: Sequence[str]) -> str:

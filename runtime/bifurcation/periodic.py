@@ -47,33 +47,19 @@ NEWTON = {
 }
 """Keywords that functions of periodic orbits refuse, with the reason."""
 
+# Largest distance of the state of an orbit from its image, relative to the extent of each state (a choice).
 CLOSED = 1e-9
-"""Largest distance of the state of an orbit from its image, relative to the extent of each state (a choice)."""
-
-SEGMENTS = 4
-"""Segments of an undriven orbit that is looked for near a start and a period (a choice)."""
-
+SEGMENTS = 4  # segments of an undriven orbit that is looked for near a start and a period (a choice)
+# Where Newton's method fails from a start, the motion is followed over FOLLOWED periods with PARTS states in each,
+# and the RECURRENCES closest returns after SPANS of a period are tried (choices).
 PARTS, FOLLOWED, SPANS, RECURRENCES = 32, 4, (0.7, 1.4), 3
-"""Where Newton's method fails from a start, the motion is followed over FOLLOWED periods with PARTS states in each, and
-the RECURRENCES closest returns after SPANS of a period are tried (choices)."""
-
-STILL = 1e-3
-"""Least motion of an orbit in a period, by its rates, in units of the motion from the start (a choice)."""
-
-PARTS_OF_PERIOD = 1024
-"""Largest n for which period / n is tested as a period (a choice)."""
-
-REST = 1e-9
-"""A motion rests if its rates are below their change over this part of its extent (a choice)."""
-
-LONGEST = 10_000
-"""Most drive periods of an orbit; unstable ones far shorter already lose all their digits."""
-
-TOGETHER = 100
-"""Periods of a transient in one call; Ctrl-C acts between calls."""
-
+STILL = 1e-3  # least motion of an orbit in a period, by its rates, in units of the motion from the start (a choice)
+PARTS_OF_PERIOD = 1024  # largest n for which period / n is tested as a period (a choice)
+REST = 1e-9  # a motion rests if its rates are below their change over this part of its extent (a choice)
+LONGEST = 10_000  # most drive periods of an orbit; unstable ones far shorter already lose all their digits
+TOGETHER = 100  # periods of a transient in one call; Ctrl-C acts between calls
+# States in a period from which the pattern of the nodes is read; fewer for MANY nodes (choices).
 LOOKS, FEWER_LOOKS, MANY = 256, 64, 64
-"""States in a period from which the pattern of the nodes is read; fewer for MANY nodes (choices)."""
 
 
 def periodic_orbit(
@@ -340,7 +326,9 @@ def _cycle(scene: Scene, classes: tuple[int, ...], flow: Flow, state: np.ndarray
         left -= some
     settled = walker.state[0]
     state = settled[:size] = _unwound(flow, settled[:size])
-    if rests(rates, settled, REST, turns.extent):
+    # The speed of a held row is zero to rounding only.
+    noise = rates.rounding(settled, turns.time) if flow.equations.has_rows else 0.0
+    if rests(rates, settled, REST, turns.extent, noise):
         at = ", ".join(f"{name} = {x:.6g}" for name, x in islice(zip(flow.equations.state, state, strict=False), 8))
         raise ArithmeticError(f"no cycle: the motion comes to rest at {at}; `equilibrium` finds such states")
     found = returns(lambda x: flow.motion(values, x)[0], rates, turns.extent, settled)

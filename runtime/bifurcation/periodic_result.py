@@ -20,18 +20,12 @@ from .flow import TOLERANCE, flow_of
 from .phases import Phases, phases_of
 from .transversal import WHOLE
 
-SAME = 1e-7
-"""Largest distance of two orbits that count as one, relative to the extent of each component (a choice)."""
-
-ROUNDING = 10.0 * TOLERANCE
-"""Largest error of the integration, relative to a state (a choice)."""
-
+SAME = 1e-7  # largest distance of two orbits that count as one, relative to the extent of each component (a choice)
+ROUNDING = 10.0 * TOLERANCE  # largest error of the integration, relative to a state (a choice)
+# Largest distance of the modulus of a neutral multiplier from 1: errors of the integration decide no stability (a
+# choice).
 NEUTRAL = 1e-9
-"""Largest distance of the modulus of a neutral multiplier from 1: errors of the integration decide no stability (a
-choice)."""
-
-LARGEST_LISTED = 6
-"""Most multipliers in a summary."""
+LARGEST_LISTED = 6  # most multipliers in a summary
 
 
 @dataclass(frozen=True, slots=True, repr=False)

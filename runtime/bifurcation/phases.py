@@ -38,11 +38,8 @@ from .flow import TOLERANCE
 Function = Callable[..., np.ndarray]
 """A function of arrays."""
 
-SAMPLES = 2000
-"""Samples in each period of the drive (a choice)."""
-
-REACH = 3
-"""Samples on each side of the middle one of a polynomial, which has the degree 6 (a choice)."""
+SAMPLES = 2000  # samples in each period of the drive (a choice)
+REACH = 3  # samples on each side of the middle one of a polynomial, which has the degree 6 (a choice)
 
 
 @dataclass(frozen=True, slots=True)

@@ -96,12 +96,11 @@ class GrowthNumbers(NamedTuple):
         return change, ((low, high) if low <= high else self.counts)
 
 
+# A value whose imaginary part is smaller, relative to the largest value, is real: the square root of rounding.
 REAL = 1e-7
-"""A value whose imaginary part is smaller, relative to the largest value, is real: the square root of rounding."""
-
+# Growth of which the error is estimated, relative to the largest value: a thousand roots of rounding, to which the
+# error of a multiple eigenvalue is known (a choice).
 UNSURE = 1e-6
-"""Growth of which the error is estimated, relative to the largest value: a thousand roots of rounding, to which the
-error of a multiple eigenvalue is known (a choice)."""
 
 
 class BranchProblem(Protocol):

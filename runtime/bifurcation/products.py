@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-SPREAD = 1e10
-"""Largest ratio of the eigenvalues of a product that are found from the product itself (a choice)."""
+SPREAD = 1e10  # largest ratio of the eigenvalues of a product that are found from the product itself (a choice)
 
 
 def product_eigenvalues(matrices: np.ndarray) -> np.ndarray:

@@ -21,8 +21,7 @@ from ..stability.transversal_modes import transversal_modes
 from .flow import TOLERANCE, Flow, flow_of
 from .products import null_vectors, product_eigenvalues
 
-WHOLE = "differences within clusters"
-"""The block of all differences, where they do not split into modes of the graph."""
+WHOLE = "differences within clusters"  # the block of all differences, where they do not split into modes of the graph
 
 
 @dataclass(slots=True)

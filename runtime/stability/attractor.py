@@ -15,7 +15,6 @@ import sympy as sp
 from scipy.linalg import orth
 
 from .limit_cycle import limit_cycle
-from .motion import rests
 from .orbits import FAR, OrbitProblem, within
 
 LONGEST = 32
@@ -119,9 +118,7 @@ def find_attractor(problem: OrbitProblem, state: np.ndarray, patience: float) ->
         return (_periodic if timed else _steady)(problem, state, Motion.LINEAR)
     closed = max(RETURN, 0.1 * problem.scene.rtol)
     if not problem.forced:
-        # the speed of a held row is zero to rounding only
-        noise = problem.rates.rounding(state, problem.unit) if problem.variation.orbit.has_rows else 0.0
-        if rests(problem.rates, state, closed, problem.extent, noise):
+        if problem.rests(state, closed):
             return _steady(problem, state, Motion.FIXED_POINT)
         cycle = limit_cycle(problem, state, closed)
         if cycle is None:

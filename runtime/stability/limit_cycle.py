@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from .motion import OrbitIntegrator, RateFunctions, path, rests, shortest_time
+from .motion import OrbitIntegrator, RateFunctions, path, shortest_time
 from .orbits import OrbitProblem
 from .variational_integrator import VariationalIntegrator
 
@@ -60,7 +60,7 @@ def limit_cycle(problem: OrbitProblem, start: np.ndarray, closed: float) -> Cycl
     """
     alone = replace(problem, strengths=np.zeros_like(problem.strengths[:1]))
     start = _free(alone, start)
-    if rests(problem.rates, start, closed, problem.extent):
+    if problem.rests(start, closed):
         return None
     for time, extent in islice(returns(partial(_integrator, alone), alone.rates, alone.extent, start), RETURNS):
         cycle = _newton(alone, start, time, extent, closed)

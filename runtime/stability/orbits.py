@@ -32,7 +32,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.initial_modes import with_modes
 from ..engines.choice import chosen_for_modes
-from .motion import RateFunctions, Turns, above, extent_of, rates_of, turns_of
+from .motion import RateFunctions, Turns, above, extent_of, rates_of, rests, turns_of
 from .variational_integrator import VariationalIntegrator
 
 FAR = 300.0
@@ -175,6 +175,11 @@ class OrbitProblem:
     def with_slip_states(self, starts: np.ndarray) -> np.ndarray:
         """Return starts (starts, components) with the slip states that follow from velocities and loads."""
         return with_modes(self.variation.orbit, starts, np.tile(self.parameter_values, (len(starts), 1)))
+
+    def rests(self, state: np.ndarray, closed: float) -> bool:
+        """Return whether an undriven orbit rests at a state; the speed of a held row is zero to rounding only."""
+        noise = self.rates.rounding(state, self.unit) if self.variation.orbit.has_rows else 0.0
+        return rests(self.rates, state, closed, self.extent, noise)
 
     def integrator(
         self, states: np.ndarray, strengths: np.ndarray | None = None, tolerance_ratio: float = 1.0
