@@ -153,7 +153,7 @@ def better(modes: Doubles, x: Doubles, best: Doubles, first: int, size: int, row
 
 @njit(error_model="numpy")
 def decide(first: int, size: int, rows: Doubles) -> int:
-    """Set the modes of the rows of a node after an event; return 0 if the laws determine none."""
+    """Set the modes of the rows of a node after an event; return how many sets agree, at most 1 where laws choose."""
     modes = np.empty(size)
     after = np.empty(size)
     x = np.empty(size)
@@ -189,4 +189,4 @@ def decide(first: int, size: int, rows: Doubles) -> int:
         rows[(first + a) * GROUPS + MODE] = after[a]
     if drops == 1 and positive_minors(first, size, rows) == 0:
         return 0
-    return matches > 0 if drops == 1 else matches == 1
+    return min(matches, 1) if drops == 1 else matches

@@ -25,7 +25,7 @@ from .decisions import decide, eliminated, forces
 from .gaps import GAP, LAW, LEVEL, MODE, NUMBER, RATE, RATIO, SPEED, K, clear_scales, place, push, smallest_gap
 
 # --- kernel text below ---
-OF_SIGN, OF_STOP, OF_RESET, OF_STOP_IN_ORDER = 0.0, 1.0, 2.0, 3.0
+OF_SIGN, OF_STOP, OF_RESET, OF_STOP_IN_ORDER, OF_REDUNDANT_SIGN = 0.0, 1.0, 2.0, 3.0, 4.0
 # What an event means for a row: nothing, its mode is known, it is decided, it lets go to the side of its force.
 UNTOUCHED, KNOWN, OPEN, RELEASED = 0.0, 1.0, 2.0, 3.0
 # Columns of the notes on rows: what the event means, mode and speed before, x before, 1 if the gap has closed, the sum
@@ -49,10 +49,16 @@ def number(group, row, lane, out, dims):
 
 
 @njit(error_model="numpy", forceinline=True)
+def is_sign(row, lane, out, dims):
+    """Return True if a row is a contact or surface."""
+    law = number(LAW, row, lane, out, dims)
+    return law < OF_STOP or law > OF_STOP_IN_ORDER
+
+
+@njit(error_model="numpy", forceinline=True)
 def is_stop(row, lane, out, dims):
     """Return True if a row is a stop."""
-    law = number(LAW, row, lane, out, dims)
-    return law != OF_SIGN and law != OF_RESET
+    return not is_sign(row, lane, out, dims) and number(LAW, row, lane, out, dims) != OF_RESET
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -83,12 +89,82 @@ def gathered(notes, lane, first, size, friction):
             rows[a * GROUPS + note] = notes[first + a, note]
         for group in (MODE, RATE, RATIO):
             rows[a * GROUPS + group] = number(group, first + a, lane, out, dims)
-        rows[a * GROUPS + LAW] = (
-            OF_STOP if is_stop(first + a, lane, out, dims) else number(LAW, first + a, lane, out, dims)
-        )
+        sign, stop = is_sign(first + a, lane, out, dims), is_stop(first + a, lane, out, dims)
+        rows[a * GROUPS + LAW] = OF_SIGN if sign else OF_STOP if stop else OF_RESET
         for b in range(size):
             rows[a * GROUPS + K + b] = number(K + b, first + a, lane, out, dims)
     return rows
+
+
+@njit(error_model="numpy")
+def any_redundant(first, lane, size, out, dims):
+    """Return True if a contact of a node cannot slide while others stick."""
+    found = False
+    for a in range(size):
+        found = found or number(LAW, first + a, lane, out, dims) == OF_REDUNDANT_SIGN
+    return found
+
+
+@njit(error_model="numpy")
+def are_independent(on, size, rows):
+    """Return True if K of the rows that are `on` their surfaces is regular."""
+    matrix, right, modes = np.empty(size * size), np.zeros(size), np.empty(size)
+    for a in range(size):
+        modes[a] = 0.0 if on[a] else 1.0
+        for b in range(size):
+            matrix[a * size + b] = rows[a * GROUPS + K + b]
+    return eliminated(matrix, right, modes, size) != 0.0
+
+
+@njit(error_model="numpy")
+def add_redundant(on, rows, lane, first, size, out, dims):
+    """Add to the rows on their surfaces the contacts that cannot slide, as others hold their bodies."""
+    if not any_redundant(first, lane, size, out, dims):
+        return
+    basis = np.zeros(size, np.bool_)
+    for a in range(size):
+        basis[a] = on[a]
+        if on[a]:
+            basis[a] = are_independent(basis, size, rows)
+    for a in range(size):
+        if not on[a] and number(LAW, first + a, lane, out, dims) == OF_REDUNDANT_SIGN:
+            basis[a] = True
+            on[a] = not are_independent(basis, size, rows)
+            basis[a] = False
+
+
+@njit(error_model="numpy")
+def share_forces(rows, lane, first, size, out, dims):
+    """Set the modes of contacts that cannot slide to the shares of their loads that they carry.
+
+    The bodies are held by other rows, whose forces depend linearly on such a share.  The share is in the middle of
+    those with which they can hold, so that no rounding error of a speed ends the hold.
+    """
+    on, modes, low, high = np.zeros(size, np.bool_), np.empty(size), np.empty(size), np.empty(size)
+    for a in range(size):
+        modes[a] = rows[a * GROUPS + MODE]
+        on[a] = modes[a] == 0.0
+    add_redundant(on, rows, lane, first, size, out, dims)
+    for a in range(size):
+        if not (on[a] and rows[a * GROUPS + ROLE] == OPEN and modes[a] != 0.0):
+            continue
+        modes[a] = -1.0
+        forces(modes, low, 0, size, rows)
+        modes[a] = 1.0
+        forces(modes, high, 0, size, rows)
+        least, most = -1.0, 1.0
+        for b in range(size):
+            # b holds while x, which rises by `slope` with the share, is between -ratio, or 0 at a stop, and ratio
+            slope, middle = 0.5 * (high[b] - low[b]), 0.5 * (high[b] + low[b])
+            if modes[b] == 0.0 and slope != 0.0:
+                stop, ratio = is_stop(first + b, lane, out, dims), rows[b * GROUPS + RATIO]
+                one = ((0.0 if stop else -ratio) - middle) / slope
+                other = (math.inf if stop else ratio - middle) / slope
+                least, most = max(least, min(one, other)), min(most, max(one, other))
+        share = 0.5 * (least + most)
+        # 0 is the mode of rows that are held
+        modes[a] = share if abs(share) > 0.1 * (most - least) else share + 0.2 * (most - least)
+        rows[a * GROUPS + MODE] = modes[a]
 
 
 @njit(error_model="numpy")
@@ -97,24 +173,33 @@ def begin_event(notes, lane, first, size, friction):
     out, dims = friction.out, friction.dims
     modes, x = np.empty(size), np.empty(size)
     speeds, hit, outcome = np.empty(size), np.zeros(size, np.bool_), 0
+    resting, on = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
     for a in range(size):
         modes[a] = number(MODE, first + a, lane, out, dims)
-    forces(modes, x, 0, size, gathered(notes, lane, first, size, friction))
+        resting[a] = modes[a] == 0.0
+    rows = gathered(notes, lane, first, size, friction)
+    forces(modes, x, 0, size, rows)
+    add_redundant(resting, rows, lane, first, size, out, dims)
     for a in range(size):
         row = first + a
         law, shut = number(LAW, row, lane, out, dims), number(GAP, row, lane, out, dims) <= 0.0
         speeds[a] = number(SPEED, row, lane, out, dims)
-        notes[row, BEFORE], notes[row, SPEED_BEFORE], notes[row, X] = modes[a], speeds[a], x[a]
-        notes[row, SHUT] = 1.0 if shut else 0.0
+        notes[row, BEFORE], notes[row, SPEED_BEFORE], notes[row, X] = 0.0 if resting[a] else modes[a], speeds[a], x[a]
+        notes[row, SHUT] = 1.0 if shut and (modes[a] == 0.0 or not resting[a]) else 0.0
         if modes[a] == 0.0:
             notes[row, ROLE] = RELEASED if shut else OPEN
         else:
-            notes[row, ROLE] = OPEN if shut and law == OF_SIGN else KNOWN
+            notes[row, ROLE] = OPEN if shut and is_sign(row, lane, out, dims) else KNOWN
+        on[a] = modes[a] == 0.0 or notes[row, ROLE] == OPEN
         if shut and law == OF_RESET:
             put(out, place(K + dims.felt + 2, row, dims), lane, 1.0)
             outcome = 1
         hit[a] = shut and is_stop(row, lane, out, dims) and modes[a] != 0.0
         outcome = 1 if hit[a] else outcome
+    add_redundant(on, rows, lane, first, size, out, dims)
+    for a in range(size):
+        if on[a] and modes[a] != 0.0:
+            notes[first + a, ROLE] = OPEN
     if outcome == 1 and not rebound(notes, hit, speeds, x, lane, first, size, friction):
         outcome = 2
     return outcome
@@ -206,12 +291,12 @@ def after_jump(notes, lane, first, size, friction):
     out, dims = friction.out, friction.dims
     for a in range(size):
         row = first + a
-        law, mode = number(LAW, row, lane, out, dims), number(MODE, row, lane, out, dims)
+        sign, mode = is_sign(row, lane, out, dims), number(MODE, row, lane, out, dims)
         speed, before = number(SPEED, row, lane, out, dims), notes[row, SPEED_BEFORE]
         jump, small = speed - before, NONE * max(notes[row, FELT], max(abs(speed), abs(before)))
-        if law == OF_SIGN and notes[row, ROLE] == KNOWN:
+        if sign and notes[row, ROLE] == KNOWN:
             put(out, place(MODE, row, dims), lane, -mode if mode * speed < 0.0 else mode)
-        elif law == OF_SIGN:
+        elif sign:
             if abs(jump) > small:
                 notes[row, ROLE] = KNOWN
                 put(out, place(MODE, row, dims), lane, 1.0 if speed > 0.0 else -1.0)
@@ -293,8 +378,11 @@ def end_events(lanes, notes, friction):
             if closed:
                 after_jump(notes[lane], lane, first, size, friction)
                 rows = gathered(notes[lane], lane, first, size, friction)
-                if decide(0, size, rows) == 0:
+                sets, several = decide(0, size, rows), any_redundant(first, lane, size, out, dims)
+                if sets == 0 or (sets > 1 and not several):
                     put(friction.clock, RUSH, lane, math.inf)
+                if several:
+                    share_forces(rows, lane, first, size, out, dims)
                 for a in range(size):
                     put(out, place(MODE, first + a, dims), lane, rows[a * GROUPS + MODE])
                 project_held(lane, first, size, friction)
@@ -306,11 +394,21 @@ def record_modes(lanes, notes, friction):
     """Write what the record of events reads to the groups of the looks: 1 for an event, mode before, mode after."""
     out, dims = friction.out, friction.dims
     for lane in range(WIDTH):
-        for row in range(dims.rows if (lanes >> lane) & 1 else 0):
-            before, after = notes[lane, row, BEFORE], number(MODE, row, lane, out, dims)
-            put(out, place(6, row, dims), lane, 1.0 if notes[lane, row, SHUT] != 0.0 or before != after else 0.0)
-            put(out, place(7, row, dims), lane, before)
-            put(out, place(8, row, dims), lane, after)
+        first = 0
+        while (lanes >> lane) & 1 and first < dims.rows:
+            size = size_of(first, lane, out, dims)
+            resting = np.zeros(size, np.bool_)
+            for a in range(size):
+                resting[a] = number(MODE, first + a, lane, out, dims) == 0.0
+            rows = gathered(notes[lane], lane, first, size, friction)
+            add_redundant(resting, rows, lane, first, size, out, dims)
+            for a in range(size):
+                row = first + a
+                before, after = notes[lane, row, BEFORE], 0.0 if resting[a] else number(MODE, row, lane, out, dims)
+                put(out, place(6, row, dims), lane, 1.0 if notes[lane, row, SHUT] != 0.0 or before != after else 0.0)
+                put(out, place(7, row, dims), lane, before)
+                put(out, place(8, row, dims), lane, after)
+            first += size
 
 
 @njit(error_model="numpy")

@@ -185,7 +185,7 @@ def settle(t: float, state: Doubles, numbers: Doubles, rows: Doubles) -> int:
         size = size_of(first, rows)
         if rows[first * GROUPS + ROLE] != UNTOUCHED:
             after_jump(first, size, rows)
-            if decide(first, size, rows) == 0:
+            if decide(first, size, rows) != 1:
                 outcome = AMBIGUOUS
             project_held(first, size, rows)
         first += size

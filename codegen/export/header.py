@@ -34,6 +34,10 @@ class Exported:
             raise ValueError(f"export to {language}: found contacts or stops in links; expected links of forces alone")
         if any(row.in_order for node in model.nodes for row in node.rows):
             raise ValueError(f"export to {language}: found stops with in_order = True; expected False")
+        if any(row.redundant for node in model.nodes for row in node.rows):
+            raise ValueError(
+                f"export to {language}: found contacts that depend on each other; expected independent ones"
+            )
         check_inertia(model, language)
         numbers = dict(zip(model.parameters, checked.values(), strict=bool(checked)))
 

@@ -37,14 +37,14 @@ from .safe_names import NAMES
 from .step import lane
 
 LAWS = {Law.SIGN: 0, Law.STOP: 1, Law.RESET: 2}  # the numbers of laws in the driver
-STOP_IN_ORDER = 3
+STOP_IN_ORDER, REDUNDANT_SIGN = 3, 4
 MOST_EVENTS = 52  # rows that are decided together: GROUPS - K (codegen/driver/rows.py)
 LEVEL, GAP, MODE, SPEED, RATE, RATIO = range(6)  # the groups of numbers in front of the looks
 
 
 def law_number(row: Row) -> sp.Integer:
     """Return the number of the law of a row in the driver."""
-    return sp.Integer(STOP_IN_ORDER if row.in_order else LAWS[row.law])
+    return sp.Integer(STOP_IN_ORDER if row.in_order else REDUNDANT_SIGN if row.redundant else LAWS[row.law])
 
 
 def most_rows(equations: Equations) -> int:
@@ -359,7 +359,8 @@ class _Looped(_Writer):
             )
             for a in held
         ]
-        x = dict(zip(held, forces([node.rows[a].law for a in held], modes, stiffness, rates), strict=True))
+        sides = [node.rows[a].side(mode) for a, mode in zip(held, modes, strict=True)]
+        x = dict(zip(held, forces(sides, modes, stiffness, rates), strict=True))
         columns, places = [], []
         for a, row in enumerate(node.rows):
             at, zeros = self.row(number, a), (sp.S.Zero,)

@@ -175,7 +175,7 @@ class _Deviations:
         for k in self.blocks(group.number):
             along = self.along(k, group)
             kicks = forces(
-                [Law.STOP] * len(held),
+                [sp.S.Zero] * len(held),
                 [row.mode for row in held],
                 [row.stiffness for row in held],
                 [_change(row.speed, along) for row in held],
@@ -235,6 +235,11 @@ def events_of(
     `slots`: the components of each block; `pushes`: what block j adds to the rates of block k while its node holds no
     row or slips.  Deviations of the parameters `names` follow the blocks.
     """
+    if orbit.has_rows and any(row.redundant for group in _groups(orbit) for row in group.rows):
+        raise ValueError(
+            "tangent dynamics: found contacts that depend on each other, as of two bodies and the ground; expected "
+            "independent ones, since their forces at rest are not unique"
+        )
     size = sum(map(len, slots))
     symbols = sp.symbols(f"deviation_:{size + len(names)}", real=True)
     by_names = list(zip((sp.Symbol(name, real=True) for name in names), symbols[size:], strict=True))

@@ -96,6 +96,9 @@ class Row:
     answer: Column  # derivative of x by the rates without rows, for the forces of links
     sets: tuple[tuple[sp.Symbol, sp.Expr], ...] = ()
     in_order: bool = False
+    redundant: bool = (
+        False  # SIGN: a level that vanishes where those of other contacts do, as of two bodies and the ground
+    )
 
     @property
     def gap(self) -> sp.Expr:
@@ -111,6 +114,10 @@ class Row:
         if self.law is Law.STOP:
             return (off + held * self.x,)
         return off + held * (self.ratio - self.x), off + held * (self.ratio + self.x)
+
+    def side(self, mode: sp.Expr) -> sp.Expr:
+        """Return the last term of the masked system in a mode, (1 - D) s."""
+        return _side(self.law, mode, self.redundant)
 
     @property
     def size(self) -> sp.Expr:
@@ -201,8 +208,9 @@ def rows_of(
         tuple(sp.factor_terms(-sp.Add(*(a * g for a, g in zip(gradient, push, strict=True)))) for push in inside)
         for gradient in gradients
     ]
-    laws = [surface.law for surface in held]
-    x = forces(laws, modes, stiffness, biases)
+    redundant = _redundant([surface.level for surface in held if surface.law is Law.SIGN], state)
+    sides = [_side(surface.law, mode, surface.level in redundant) for surface, mode in zip(held, modes, strict=False)]
+    x = forces(sides, modes, stiffness, biases)
     # in larger parts the forces of links are among the rates, so that none is added later
     inverse = _inverse(modes, stiffness) if len(held) <= MOST_ROWS else [()] * len(held)
     answers = [
@@ -226,9 +234,23 @@ def rows_of(
             lift[places[coordinate]] = inside[a][places[speed]]
         rows.append(
             Row(surface.law, modes[a], surface.level, levels[a], biases[a], gradients[a], tuple(inside[a]), stiffness[a],
-                surface.ratio, x[a], tuple(lift), answers[a], in_order=surface.in_order)
+                surface.ratio, x[a], tuple(lift), answers[a], in_order=surface.in_order,
+                redundant=surface.law is Law.SIGN and surface.level in redundant)
         )  # fmt: skip
     return tuple(rows)
+
+
+def _redundant(levels: Sequence[sp.Expr], state: Sequence[sp.Symbol]) -> set[sp.Expr]:
+    """Return the levels of which a sum with constant factors vanishes at all states and times."""
+    # each level as a row of its factors of functions of states and time
+    moving = {*state, TIME}
+    terms = [[e.as_independent(*moving, as_Add=False) for e in sp.Add.make_args(sp.expand(level))] for level in levels]
+    functions = list(dict.fromkeys(function for row in terms for _, function in row))
+    table = sp.Matrix(
+        len(levels), len(functions), lambda k, j: sp.Add(*(factor for factor, f in terms[k] if f == functions[j]))
+    )
+    sums = table.T.nullspace() if len(levels) > 1 else []
+    return {level for k, level in enumerate(levels) if any(factors[k] != 0 for factors in sums)}
 
 
 def added_rates(rows: Sequence[Row], size: int) -> list[sp.Expr]:
@@ -236,17 +258,21 @@ def added_rates(rows: Sequence[Row], size: int) -> list[sp.Expr]:
     return [sp.Add(*(row.push[c] * row.x for row in rows if row.law is not Law.RESET)) for c in range(size)]
 
 
+def _side(law: Law, mode: sp.Expr, redundant: bool) -> sp.Expr:
+    """Return (1 - D) s with D = 1 - s**2 of a contact, which is s if it slides; of a stop 0."""
+    if law is not Law.SIGN:
+        return sp.S.Zero
+    return mode**3 if redundant else mode
+
+
 def forces(
-    laws: Sequence[Law], modes: Sequence[sp.Symbol], stiffness: Sequence[Column], rates: Sequence[sp.Expr]
+    sides: Sequence[sp.Expr], modes: Sequence[sp.Symbol], stiffness: Sequence[Column], rates: Sequence[sp.Expr]
 ) -> list[sp.Expr]:
-    """Return x of each row that can be held: A x = D b + (1 - D) s with A = D K + (1 - D), and s = 0 at stops.
+    """Return x of each row that can be held: A x = D b + (1 - D) s with A = D K + (1 - D); sides: the last terms.
 
     In rows that are not held A is the identity, so that x = s there to the last bit.
     """
-    right = [
-        (1 - mode**2) * rate + (mode if law is Law.SIGN else sp.S.Zero)
-        for law, mode, rate in zip(laws, modes, rates, strict=True)
-    ]
+    right = [(1 - mode**2) * rate + side for mode, rate, side in zip(modes, rates, sides, strict=True)]
     if len(modes) > MOST_ROWS:
         return _eliminated(_masked(modes, stiffness), right)
     return [sp.Add(*(e * c for e, c in zip(row, right, strict=True))) for row in _inverse(modes, stiffness)]

@@ -111,7 +111,8 @@ def _decide_together(
         stiffness = np.array([[evaluate(e, at, (1,))[0] for e in rows[a].stiffness] for a in held])
         free = [held.index(a) for a in numbers]
         stops = np.array([rows[a].law is Law.STOP for a in held])
-        best = _agreeing(np.array(rate), np.array(ratio), stiffness, stops, states[cell, slots], free)
+        redundant = np.array([rows[a].redundant for a in held])
+        best = _agreeing(np.array(rate), np.array(ratio), stiffness, stops, states[cell, slots], free, redundant)
         if best is None:
             raise ValueError(
                 f"start: found no single motion of {where} that agrees with its contacts or surfaces; expected one; change "
@@ -156,27 +157,64 @@ def _agreeing(
     stops: np.ndarray,
     modes: np.ndarray,
     free: Sequence[int],
+    redundant: np.ndarray,
 ) -> np.ndarray | None:
-    """Return the modes with most held rows that agree with the laws; None if there are none, or no single ones."""
-    found = []
+    """Return the modes with most held rows that agree with the laws; None if there are none, or no single ones.
+
+    redundant: contacts that depend on each other, so that at rest their forces are not unique; the motion is.
+    """
+    found, slack = [], 1e-9 if redundant.any() else 0.0
     options = itertools.product(*((0.0, 1.0) if stops[a] else (0.0, 1.0, -1.0) for a in free))
     for choice in sorted(options, key=lambda each: sum(map(abs, each))):
         tried = modes.copy()
         tried[list(free)] = choice
         held = tried == 0.0
-        x = np.where(held | stops, 0.0, tried)
-        try:
-            x[held] = np.linalg.solve(stiffness[np.ix_(held, held)], (rate - stiffness @ x)[held])
-        except np.linalg.LinAlgError:
+        x = _forces(rate, stiffness, stops, tried)
+        if x is None:
             continue
         slope = rate - stiffness @ x
         holds = np.where(stops, x >= 0.0, abs(x) <= ratio)
-        leaves = np.where(stops, slope < 0.0, tried * slope > 0.0)
+        small = slack * (abs(rate) + abs(stiffness) @ abs(x))
+        leaves = np.where(stops, slope < small, tried * slope > -small)
         if np.where(held, holds, leaves)[list(free)].all():
-            found.append(tried)
+            moved = abs(slope) > small
+            found.append(_shared(rate, ratio, stiffness, stops, tried, ~held & redundant & ~moved))
     # static friction above kinetic friction leaves a choice; without it several answers mean that none is determined
     drops = any(ratio[a] > 1.0 for a in free if not stops[a])
-    return found[0] if len(found) == 1 or (found and drops) else None
+    return found[0] if len(found) == 1 or (found and (drops or redundant.any())) else None
+
+
+def _forces(rate: np.ndarray, stiffness: np.ndarray, stops: np.ndarray, modes: np.ndarray) -> np.ndarray | None:
+    """Return x of all rows in some modes; None if the held rows depend on each other."""
+    held = modes == 0.0
+    x = np.where(held | stops, 0.0, modes)
+    block = stiffness[np.ix_(held, held)]
+    if held.any() and np.linalg.cond(block) > 1e12:
+        return None
+    x[held] = np.linalg.solve(block, (rate - stiffness @ x)[held])
+    return x
+
+
+def _shared(
+    rate: np.ndarray,
+    ratio: np.ndarray,
+    stiffness: np.ndarray,
+    stops: np.ndarray,
+    modes: np.ndarray,
+    resting: np.ndarray,
+) -> np.ndarray:
+    """Return modes with shares of the load of contacts that cannot slide, as `share_forces` of codegen/driver/rows.py."""
+    held = modes == 0.0
+    for a in np.flatnonzero(resting):
+        ends = [_forces(rate, stiffness, stops, np.where(np.arange(len(modes)) == a, s, modes)) for s in (-1.0, 1.0)]
+        low, high = (x[held] for x in ends if x is not None)
+        slope, middle = (high - low) / 2, (high + low) / 2
+        least, most = np.where(stops, 0.0, -ratio)[held] - middle, np.where(stops, np.inf, ratio)[held] - middle
+        bounds = np.sort([least[slope != 0] / slope[slope != 0], most[slope != 0] / slope[slope != 0]], axis=0)
+        low_end, high_end = max(-1.0, *bounds[0]), min(1.0, *bounds[1])
+        share, span = (low_end + high_end) / 2, high_end - low_end
+        modes = np.where(np.arange(len(modes)) == a, share if abs(share) > 0.1 * span else share + 0.2 * span, modes)
+    return modes
 
 
 def _of_nodes(equations: Equations, node: Node, members: Sequence[int], values: Values, states: np.ndarray) -> Values:

@@ -152,6 +152,42 @@ def test_friction_that_drives_a_rotation_has_no_single_answer() -> None:
     assert "several motions agree" in found.message
 
 
+@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize(
+    ("between", "force", "release", "free"),
+    [
+        (R(3, 10), R(1, 5) + T / 50, 20.0, 1),  # the first block alone, at 0.3 + 0.3
+        (R(3, 10), R(1, 5) - 3 * T / 100, 80 / 3, 1),  # the same to the other side, past forces of zero
+        (R(3, 5), R(1, 5) + T / 50, 30.0, 2),  # both together, at 0.3 + 0.5
+    ],
+)
+def test_contacts_that_depend_on_each_other(between, force, release: float, free: int, integrator: str) -> None:
+    """Two blocks of mass 1 on the ground, loads 0.3 and 0.5, rub on each other; at rest the forces are not unique."""
+    y, u = sp.symbols("y u")
+    law = sc.friction_law("sign(w)")
+    contacts = [
+        sc.Friction(-V, load=R(3, 10), law=law),
+        sc.Friction(-u, load=R(1, 2), law=law),
+        sc.Friction(V - u, load=between, law=law),
+    ]
+    blocks = sc.Lagrangian((V**2 + u**2) / 2, 0, {X: force}, coordinates={X: V, y: u}, contact="set-valued", events=contacts)  # fmt: skip
+    start = {"v": [1.0], "u": [0.5]}
+    given = scene(blocks, release + 1.0, integrator, initial=start, record=("events",))
+    result = sc.run(given, workers=1, show_progress=False)
+    times = result.events.event_time.values[: int(result.event_count)]
+    assert np.sum(times > 3.0) == 2  # of the two contacts that begin to slide
+    assert times[times > 3.0] == pytest.approx(release, abs=1e-9)
+    slope = float(force.diff(T))
+    speed = slope / 2 / free  # after one unit of time
+    assert result.end.sel(component="v").values == pytest.approx(speed, abs=1e-9)
+    assert result.end.sel(component="u").values == pytest.approx(speed if free == 2 else 0.0, abs=1e-9)
+    with pytest.raises(ValueError, match="found contacts that depend on each other"):
+        sc.lyapunov_spectrum(given)
+    # a start at rest too
+    rest = sc.run(given.replace(initial={}), workers=1, show_progress=False)
+    assert rest.events.event_time.values[: int(rest.event_count)] == pytest.approx([release] * 2, abs=1e-9)
+
+
 def test_refusals_of_contacts() -> None:
     with pytest.raises(ValueError, match="contacts 1 and 2 slide together; add their loads"):
         scene(contact(V**2 / 2, X**2 / 2, {X: sc.friction(-V) + 2 * sc.friction(-2 * V)}, {X: V}), 1.0, "dop853")
