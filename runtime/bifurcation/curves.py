@@ -37,7 +37,7 @@ from synchain.models.inputs.checks import check_keys, check_positive, check_tabl
 from .arclength import FIRST_STEP, LARGEST_STEP, MOST, Limits, Point, correct, walk
 from .critical_curve import CriticalCurve
 from .cycle_curves import CycleCurve
-from .detection import TOGETHER, BranchStep, critical_of
+from .detection import TOGETHER, VERTICAL, BranchStep, critical_of
 from .equilibrium import Equilibrium
 from .equilibrium_curves import EquilibriumCurve
 from .kinds import BifurcationKind
@@ -80,7 +80,8 @@ def _points(problem: CriticalCurve, step: BranchStep) -> Iterator[tuple[float, C
             cusps += [step.zero(test)] if name == "cusp" else []
             yield point(name, step.zero(test))
     for place, name in zip((-2, -1), problem.names, strict=True):
-        if ends[0].tangent[place] * ends[1].tangent[place] < 0.0:
+        slopes = problem.weights[place] * np.array([each.tangent[place] for each in ends])
+        if slopes[0] * slopes[1] < 0.0 and abs(slopes).max() > VERTICAL:
             distance = step.zero(lambda at, place=place: float(at.tangent[place]))  # type: ignore[misc]
             # Parameters turn at a cusp, too.
             if all(abs(distance - cusp) > TOGETHER * step.length for cusp in cusps):

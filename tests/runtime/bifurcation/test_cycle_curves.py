@@ -70,6 +70,7 @@ def test_torus_points_end_in_a_zero_hopf_point() -> None:
     (end,) = curve.points["zero-Hopf"]
     np.testing.assert_allclose(end.values, [0, 0], atol=1e-10)
     assert curve.ends[0].startswith("zero-Hopf at")
+    assert "extreme q" not in curve.points  # q is zero to rounding
 
 
 def test_both_folds_of_a_resonance_lie_on_one_curve() -> None:
