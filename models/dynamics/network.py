@@ -437,7 +437,10 @@ def _mixed_layer(
     singles, pairs = apart.nodes, sorted({apart.ends(link) for link in graph.links})
     edges = tuple(((a, b), edge(coupling, singles[a], oscillators[a], singles[b], oscillators[b])) for a, b in pairs)
     if any(a == b and link.oriented for (a, b), link in edges):
-        raise ValueError(f"coupling {str(coupling)!r} tells the ends of a link apart; expected nodes of one kind")
+        raise ValueError(
+            f"coupling {str(coupling)!r} tells the ends of a link apart; expected nodes of one kind, which "
+            "may differ in parameters (a stop that a node cannot reach has no effect)"
+        )
     shared = tuple((ends, link.with_shared(apart.varied)) for ends, link in edges)
     return _listed_layer(shared, graph, numbered, mutual) if numbered else Layer(shared, graph.links)
 

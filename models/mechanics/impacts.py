@@ -147,6 +147,8 @@ class Reset:
         """Return the event with every expression changed; `change` takes the name of each."""
         guard = change("guard", self.guard)
         sets = {state(key): change(f"value of {key}", value) for key, value in self.sets.items()}
+        if not sets:
+            raise ValueError(f"reset {guard}: found no new values; expected a value of at least one state")
         after = guard.xreplace({sp.Symbol(name, real=True): value for name, value in sets.items()})
         if after.is_number and after >= 0:
             raise ValueError(

@@ -178,6 +178,7 @@ def test_the_error_of_clocks_that_reset_one_after_the_other(integrator: str) -> 
             lambda: sc.Reset(Y - 1, {Y: 2}),
             "found the guard 1 just after; expected a negative value, else it fires without end",
         ),
+        (lambda: sc.Reset(Y - 1, {}), "found no new values; expected a value of at least one state"),
         (lambda: sc.Friction(-V, law=sp.sign(V)), "event 1: law: found .*; expected a name"),
         (lambda: "stop", "event 1: found 'stop'.*; expected Friction or Stop or Reset"),
     ],

@@ -174,6 +174,20 @@ def test_impacts_at_one_instant_that_feel_each_other_are_ambiguous(integrator: s
     assert end(both.replace(initial={"x": [0, 1, 2.1], "v": [1, 0, -1]}))["v"].sum() == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("integrator", [*METHODS, "rodas5p"])
+def test_static_friction_between_blocks(integrator: str) -> None:
+    """The force t on the first block: the friction that drags the second is t/2 until it reaches 3/2 at t = 3, then 1."""
+    force = sp.Symbol("F")
+    pulled = sc.Lagrangian(V**2 / 2, 0, {X: force * T}, coordinates={X: V}, parameters={force: 0})
+    law = sc.friction_law("sign(w)", static=R(3, 2))
+    rub = sc.Potential(0, {N: 1}, events=[sc.Friction("v_j - v_i", load="W*N", law=law)])
+    given = scene(pulled, rub, sc.graphs.chain(2), 4.0, integrator, parameters={"F": [1.0, 0.0]},
+                  initial={"x": 0.0, "v": 0.0}, record=["events"])  # fmt: skip
+    found = sc.run(given, workers=1, show_progress=False)
+    assert found.events.event_time.values == pytest.approx([3.0], abs=1e-11)
+    assert found.end.sel(component="v").values == pytest.approx([2.25 + 3.5 - 1, 2.25 + 1], abs=1e-11)
+
+
 def one_after_another(v: list[float], e: float) -> list[float]:
     """Impacts of neighbours of mass 1 in turn, from the first pair to the last, until none approach."""
     v, approaching = [float(each) for each in v], True
