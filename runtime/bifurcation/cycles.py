@@ -140,20 +140,22 @@ class Cycles:
     def at_hopf(cls, rest: Equilibrium, name: str, vector: np.ndarray, frequency: float) -> tuple[Cycles, np.ndarray]:
         """Return the cycles born at a Hopf point, and their first direction (n,). Shapes: vector (states,) complex."""
         classes = classes_of(rest.scene, np.stack([rest.state, vector.real, vector.imag]))
-        # Real and imaginary part of the eigenvector are orthogonal; the phase of the cycle is fixed across the second.
-        vector = vector * np.exp(-0.5j * np.angle(np.sum(vector**2)))
         copies = expansion(rest.scene.equations, classes, len(vector) * len(set(classes)) // rest.scene.n)
-        state, wave = ((copies.T @ each) / copies.sum(axis=0) for each in (rest.state, vector))
+        rows = (rest.state, np.array(rest.scene.y0), vector)
+        state, first, wave = ((copies.T @ each) / copies.sum(axis=0) for each in rows)
         problem = cls.near(rest.scene, (name,), classes, state[None], 2.0 * math.pi / frequency, 0)
-        size, first = float(np.abs(state).max()), float(np.abs(rest.scene.y0).max())
-        if size <= ORIGIN * first:  # the origin to rounding, which gives no unit
-            size = first
-        size = size or 1.0
-        problem.scale = size * np.maximum(np.abs(wave) / np.abs(wave).max(), 1e-3)
-        problem.phase = (-wave.imag / problem.scale / np.linalg.norm(wave.imag / problem.scale))[None]
+        units = problem._balance(state)
+        size, begun = (float(np.abs(each / units).max()) for each in (state, first))
+        if size <= ORIGIN * begun:  # the origin to rounding, which gives no unit
+            size = begun
+        extents = np.abs(wave / units)
+        problem.scale = units * (size or 1.0) * np.maximum(extents / extents.max(), 1e-3)
+        # Real and imaginary part of the eigenvector are orthogonal; the phase of the cycle is fixed across the second.
+        wave = wave / problem.scale
+        wave *= np.exp(-0.5j * np.angle(np.sum(wave**2)))
+        problem.phase = (-wave.imag / np.linalg.norm(wave.imag))[None]
         problem.speed = 0.0
-        real, imaginary = wave.real / problem.scale, wave.imag / problem.scale
-        return problem, wave.real - float(real @ imaginary) / float(imaginary @ imaginary) * wave.imag
+        return problem, problem.scale * wave.real
 
     @classmethod
     def leaving(
@@ -360,6 +362,15 @@ class Cycles:
         self.scale = scale if math.isnan(self.speed) else np.maximum(self.scale, scale)
         self.last = None
         self.speed = float(np.linalg.norm(self.flow.rates(self.values(z), self.states(z)[:1])[0] / self.scale))
+
+    def _balance(self, state: np.ndarray) -> np.ndarray:
+        """Return a unit of each state, in which the states that drive each other change alike (Osborne, J. ACM 7, 338)."""
+        assert isinstance(self.flow, LiftedFlow)  # equilibria have smooth rates
+        network, *_ = self.flow.at(self.scene.parameters)
+        jacobian, mass = network.jacobian(state).toarray(), network.mass(state)
+        if mass is not None:
+            jacobian = linalg.solve(mass.toarray(), jacobian)
+        return np.asarray(linalg.matrix_balance(jacobian, permute=False, separate=True)[1][0])
 
     def _find_turns_and_shifts(self, states: np.ndarray, period: float) -> np.ndarray:
         """Find the shifts and the whole turns of angles in a period; return the distances that the shifts move."""

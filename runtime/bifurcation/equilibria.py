@@ -20,7 +20,7 @@ from synchain.models.scenes.scene import Scene
 from ..cells.run_keywords import with_numbers
 from .arclength import Point
 from .eigenvalues import DENSE, SMALL, ModeBlocks, eigenvalue_condition, eigenvalues
-from .equilibrium import Equilibrium, bordered, resting_equations
+from .equilibrium import Equilibrium, bordered, fastest, resting_equations
 from .kinds import BifurcationKind
 from .linearised import Linearised
 from .problems import GrowthNumbers, Matrix
@@ -252,7 +252,7 @@ class Equilibria:
         mass = sparse.eye_array(self.size, format="csc") if mass is None else mass
         # At zero the shifts are null vectors too: border the matrix, so that they are left out.
         shifted = jacobian if value else bordered(jacobian, self.ones)
-        size, scale = shifted.shape[0], float(abs(jacobian).max()) or 1.0
+        size, scale = shifted.shape[0], fastest(network, state) or abs(value) or 1.0
         heavy = sparse.block_diag([mass, sparse.csc_array((size - self.size,) * 2)], format="csc")
         # Inverse iteration beside the eigenvalue.
         matrix = sparse.csc_array(shifted - (value + 1e-10 * scale * (1.0 + 0.3j)) * heavy)

@@ -299,10 +299,10 @@ def near(
     jacobian, blocks = network.jacobian(state), None if count else ModeBlocks.of(scene.equations)
     by_modes = None if blocks is None else blocks.values(jacobian)
     values = eigenvalues(jacobian, network.mass(state), count) if by_modes is None else by_modes[0]
-    sizes, limit = np.abs(values), LEAST * _fastest(network, state)
-    if np.any((sizes > limit) & (sizes <= LEAST * _fastest(network, first))):
+    sizes, limit = np.abs(values), LEAST * fastest(network, state)
+    if np.any((sizes > limit) & (sizes <= LEAST * fastest(network, first))):
         # the terms of a slope may be larger than the slope, as those of x - sin x at 0
-        limit = LEAST * _fastest(network.sized(scene.parameters), state)
+        limit = LEAST * fastest(network.sized(scene.parameters), state)
     values[sizes <= limit] = 0.0
     if search.multiple:  # the eigenvalue is the square root of a rounding error
         values[np.argsort(np.abs(values), kind="stable")[len(names)]] = 0.0
@@ -340,7 +340,7 @@ def _jacobian(network: Linearised, state: np.ndarray) -> sparse.csc_array:
     return jacobian
 
 
-def _fastest(network: Linearised, *states: np.ndarray) -> float:
+def fastest(network: Linearised, *states: np.ndarray) -> float:
     """Return a size of the eigenvalues of M^-1 J near some states, in units of a rate: |a| and sqrt|b c| of [[a, b], [c, 0]].
 
     Products of opposite entries do not depend on the units of the states, as the entries themselves do.

@@ -254,6 +254,29 @@ def test_small_circles_are_born_at_a_hopf_point(radius: float) -> None:
 LORENZ = sc.Field({"x": "10*(y - x)", "y": "x*(r - z) - y", "z": "x*y - 8*z/3"}, parameters={"r": 24})
 
 
+@cache
+def cycles_of_lorenz(x: float, y: float, z: float, t: float) -> sc.results.Branch:
+    """The cycles from the Hopf point to r = 24, with a unit of each state and of time."""
+    rates = {
+        "x": f"10*(y*{x / y!r} - x)/{t!r}",
+        "y": f"(r*x*{y / x!r} - y - x*z*{y / x / z!r})/{t!r}",
+        "z": f"(x*y*{z / x / y!r} - 8*z/3)/{t!r}",
+    }
+    scene = sc.Scene(sc.Field(rates, parameters={"r": 20.0}), initial={"x": 7 * x, "y": 7 * y, "z": 19 * z})
+    (hopf,) = sc.follow(sc.equilibrium(scene), "r", to=26.0).points["Hopf"]
+    assert hopf.value == pytest.approx(470 / 19, abs=1e-11)
+    return sc.follow(hopf, "r", to=24.0)
+
+
+@pytest.mark.parametrize("units", [(1.0, 1e-9, 1e6, 1.0), (1e9, 1e3, 1e-6, 1e-6), (1e-9, 1e6, 1.0, 1e6)])
+def test_cycles_are_born_alike_in_any_unit_of_each_state_and_of_time(units: tuple[float, float, float, float]) -> None:
+    """As many solutions as in units of 1, to within the powers of 2 that balance the states; the cycle at r = 24 (F)."""
+    cycles, plain = cycles_of_lorenz(*units), cycles_of_lorenz(1.0, 1.0, 1.0, 1.0)
+    assert abs(len(cycles) - len(plain)) <= 3
+    assert cycles[-1].period / units[3] == pytest.approx(0.679336764198, abs=2e-12)
+    assert cycles[-1].multipliers[0].real == pytest.approx(1.03208829783, abs=1e-9)
+
+
 def test_newtons_method_reaches_the_unstable_cycle_of_lorenz_from_afar() -> None:
     """Full steps from this start lead away; shorter ones reach the cycle (F), on several segments and on one."""
     scene, start = sc.Scene(LORENZ), np.array([7.0, 7.0, 19.0])
