@@ -260,7 +260,8 @@ def lyapunov_spectrum(
             growths, _, gone = frame.advance(parts)
             np.logical_or(lost, gone, out=lost)
             batches.extend(growths[:, None], parts)
-        steps = frame.error_of_steps()
+        ends = frame.uneven_growth(batches.mean()[0]) / batches.time
+        steps = np.hypot(frame.error_of_steps(), ends)
     orbit = frame.integrator
     whole = averaging.transient * frame.unit + batches.time
     result = _report(frame, batches, lost, steps, whole)

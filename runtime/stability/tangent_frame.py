@@ -52,6 +52,9 @@ UNIT = 1024
 components
 of usual sizes share one unit."""
 
+PIECES = 16
+"""Parts of a turn after each of which the growth is measured, for its scatter at the ends of an average."""
+
 LOOKED = 2
 """Number of drive periods in which the extent of a motion is measured."""
 
@@ -184,6 +187,23 @@ class TangentFrame:
             self.phase = phase
             usual.append(self.advance(single)[0][0])
         return error_of_steps(usual, looser, self.unit / self.parts)
+
+    def uneven_growth(self, mean: np.ndarray) -> np.ndarray:
+        """Return the scatter (count + 1,) of the growth between the two ends of an average, beyond that at the mean rate.
+
+        The turns of undriven motion are known on average only: the run may end anywhere in a turn.  Within a turn the
+        logarithm of a length wanders about its mean rate; two independent ends add.  Periods of a drive are whole.
+        """
+        if self.orbit.forced:
+            return np.zeros(self.count + 1)
+        parts, phase = self.parts, self.phase
+        with self.integrator.loosened(1.0):  # the average goes on from the state before
+            self.parts, self.phase = PIECES, 0
+            growth = np.cumsum(self.advance(np.ones(PIECES, dtype=np.int64))[0], axis=0)
+        self.parts, self.phase = parts, phase
+        with np.errstate(invalid="ignore"):
+            steady = np.arange(1, PIECES + 1)[:, None] * (self.unit / PIECES) * mean
+            return np.asarray(np.nan_to_num(math.sqrt(2.0) * np.std(growth - steady, axis=0), posinf=0.0))
 
     def choose_block(self) -> None:
         """Choose the smallest number of blocks in a period for which most directions are resolved."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain import Field, Scene, exponents, lyapunov_spectrum, run
+from synchain import Field, Scene, exponents, lyapunov_spectrum, periodic_orbit, run
 from synchain.graphs import from_matrix, topology
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import PHASE, network_variation, phase_shifted, with_volume
@@ -263,3 +263,18 @@ def test_directions_are_those_of_householder_after_each_block() -> None:
             np.testing.assert_allclose(growth[:-1], rates + np.log(np.abs(np.diagonal(triangle))), atol=1e-6)
             assert growth[-1] == pytest.approx(other.integrator.state[0, -scene.n :].sum() - before, abs=1e-6)
         np.testing.assert_allclose(np.abs(frame.integrator.vectors[0, :, :count]), np.abs(basis), atol=1e-5)
+
+
+@pytest.mark.parametrize(("x", "v", "t"), [(1.0, 1.0, 1.0), (1e-9, 1e3, 1e6), (1e6, 1e-3, 1e-6)])
+def test_errors_include_the_unfinished_turn_at_the_end_in_any_units(x: float, v: float, t: float) -> None:
+    """The sum of the exponents of van der Pol's equation is the logarithm of the multiplier of its orbit over the period."""
+    rates = {"x": f"v*{x / v!r}/{t!r}", "v": f"((1 - (x/{x!r})**2)*v - x*{v / x!r})/{t!r}"}
+    scene = Scene(Field(rates), initial={"x": 2.0 * x, "v": 0.0}, transient=50.0 * t)
+    result = lyapunov_spectrum(scene)
+    orbit = periodic_orbit(
+        Scene(Field({"x": "v", "v": "(1 - x**2)*v - x"}), initial={"x": 2.0, "v": 0.0}, transient=50.0)
+    )
+    exact = np.log(np.abs(np.prod(orbit.multipliers))) / orbit.period / t
+    assert abs(result.divergence - exact) < 2.0 * result.divergence_error < 4e-3 / t
+    assert np.all(np.abs(result.exponent - [0.0, exact]) < 2.0 * result.stderr)
+    assert result.stderr[1] < 2e-3 / t
