@@ -43,6 +43,10 @@ HIDDEN applies if only the low coefficients vanish.  LOST applies at zeros of hi
 without LOST.
 """
 
+NOISE = 1e-13
+"""High coefficients below this part of the first one, with low ones below this part of them, are rounding errors; a
+choice."""
+
 REMOTE, NEARER = 230.0, 100.0
 """REMOTE: exponentials below exp(-REMOTE) = 1e-100 affect no coefficient.  NEARER: a step may always raise them by
 this.
@@ -74,11 +78,15 @@ def unseen(coefficients: Sequence[Expression]) -> list[Statement]:
     if not (low and high):
         return []
     least = HIDDEN * Name("high") + LOST * Name("atol")
-    return [
-        let("high", largest(high)),
-        let("low", largest(low)),
-        let("unseen", call("maximum", "unseen", Name("high") / (Name("low") + least))),
-    ]
+    statements = [let("high", largest(high)), let("low", largest(low))]
+    if (first := coefficients[0]) != ZERO:
+        # a series that is constant to rounding, as the radius of a circle, would shorten step after step
+        bound = call(
+            "minimum", NOISE * absolute(first) + Negation(Name("high")), NOISE * Name("high") + Negation(Name("low"))
+        )
+        cut = call("select", Compare(">", bound, Number(0.0)), 0.0 * Name("high"), Name("high"))
+        statements.append(let("high", cut))
+    return [*statements, let("unseen", call("maximum", "unseen", Name("high") / (Name("low") + least)))]
 
 
 def bounded(coefficients: Sequence[Expression]) -> list[Statement]:

@@ -46,7 +46,7 @@ def test_folds_of_cycles_end_where_the_cycle_vanishes(unit: float) -> None:
     """r' = r (m + l r^2 - r^4): folds at m = -l^2/4, r^2 = l/2, which end in the Bautin point at m = l = 0 (C)."""
     s = f"((x**2 + y**2)/{unit**2})"
     rates = {"x": f"x*(m + l*{s} - {s}**2) - y", "y": f"y*(m + l*{s} - {s}**2) + x"}
-    scene = sc.Scene(sc.Field(rates, parameters={"m": -0.1, "l": 1}), integrator="dop853")
+    scene = sc.Scene(sc.Field(rates, parameters={"m": -0.1, "l": 1}))
     first = sc.periodic_orbit(scene, start=[0.95 * unit, 0], period=6)
     fold = sc.follow(first, "m", to=-1).points["fold"][0]
     curve = sc.follow(fold, ("m", "l"), within={"l": (-0.5, 2)})
