@@ -62,7 +62,7 @@ def _change(e: sp.Expr, moves: Iterable[tuple[sp.Symbol, sp.Expr]]) -> sp.Expr:
     return sp.Add(*(derivative(e, s) * moved for s, moved in moves))
 
 
-class _Group(NamedTuple):
+class _Bodies(NamedTuple):
     """A node, or a part of a network with rows in links; the rates and forces of a part contain its links."""
 
     number: int
@@ -92,7 +92,7 @@ class _Deviations:
     def blocks(self, group: int) -> list[int]:
         return [k for k, owner in enumerate(self.owners) if owner == group]
 
-    def along(self, k: int, group: _Group) -> Moves:
+    def along(self, k: int, group: _Bodies) -> Moves:
         """Return what block `k` and the parameters change in the forces of a group."""
         # the forces of a part hold the states of nodes that links join to it
         if self.orbit.joined:
@@ -149,7 +149,7 @@ class _Deviations:
                 begun |= self.after_start(group)
         yield self.all(begun)
 
-    def after_event(self, group: _Group, row: Row) -> dict[int, sp.Expr]:
+    def after_event(self, group: _Bodies, row: Row) -> dict[int, sp.Expr]:
         """Return what the components of a deviation become at an event of a row."""
         rates, z = self.rates, [self.states[c] for c in group.places]
         then = {self.states[c]: self.then[self.states[c]] for i in group.nodes for c in self.orbit.places[i]}
@@ -168,7 +168,7 @@ class _Deviations:
                 jump[c] = _change(e, along) + gained * lead
         return jump
 
-    def after_start(self, group: _Group) -> dict[int, sp.Expr]:
+    def after_start(self, group: _Bodies) -> dict[int, sp.Expr]:
         """Return the components of a deviation along the surfaces of the rows that are held at the start."""
         begun: dict[int, sp.Expr] = {}
         held = group.held
@@ -203,7 +203,7 @@ def _closing_gap(row: Row, then: Mapping[sp.Symbol, sp.Symbol]) -> tuple[sp.Expr
     return off * row.level + (1 - off) * (limit - side * row.x), -(1 - off) * side
 
 
-def _reset(row: Row, states: Sequence[sp.Symbol], then: Mapping[sp.Symbol, sp.Symbol], group: _Group) -> list[sp.Expr]:
+def _reset(row: Row, states: Sequence[sp.Symbol], then: Mapping[sp.Symbol, sp.Symbol], group: _Bodies) -> list[sp.Expr]:
     """Return the continuous states of a group after an event of a row, by those before it."""
     if row.law is Law.RESET:
         return [dict(row.sets).get(s, s) for s in states]
@@ -214,13 +214,13 @@ def _reset(row: Row, states: Sequence[sp.Symbol], then: Mapping[sp.Symbol, sp.Sy
     return [s + push * kick for s, push in zip(states, row.push, strict=True)]
 
 
-def _groups(equations: Equations) -> Iterator[_Group]:
+def _groups(equations: Equations) -> Iterator[_Bodies]:
     """Yield each part, or each node, in the order of a kernel."""
     for number, part in enumerate(equations.parts):
-        yield _Group(number, part.nodes, part.rows, part.places)
+        yield _Bodies(number, part.nodes, part.rows, part.places)
     for i in () if equations.joined else sorted(range(equations.n), key=equations.kind_of.__getitem__):
         size = len(equations.node_at(i).continuous)
-        yield _Group(i, (i,), equations.rows_at(i), equations.places[i][:size])
+        yield _Bodies(i, (i,), equations.rows_at(i), equations.places[i][:size])
 
 
 def events_of(
