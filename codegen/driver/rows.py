@@ -228,6 +228,9 @@ def rebound(notes, hit, speeds, x, lane, first, size, friction):
             if not left[a]:
                 continue
             row, left[a] = first + a, False
+            # a restitution that depends on states is a number only now
+            if not -NONE <= number(RATIO, row, lane, out, dims) <= 1.0 + NONE:
+                return False
             impulse = impulse_of(notes, speeds, x, turn, a, lane, first, size, friction)
             put(out, place(K + dims.felt, row, dims), lane, number(K + dims.felt, row, lane, out, dims) + impulse)
             for b in range(size):

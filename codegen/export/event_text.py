@@ -49,13 +49,13 @@ PASSED, SHORTEST, NONE, LOWEST, PART = 1e-13, 1e-13, 1e-12, 1e-12, 0.015625
 
 
 def rebound(modes: Doubles, x: Doubles, a: int, first: int, size: int, rows: Doubles) -> int:
-    """Note the impulse of a stop by Newton's law; return 0 if a stop is hit that feels another one."""
+    """Note the impulse of a stop by Newton's law; return 0 if it fixes none: two stops feel each other, or e is not in 0..1."""
     at = (first + a) * GROUPS
     speed = rows[at + SPEED]
     stiff = rows[at + K + a]
     e = rows[at + RATIO]
     inward = rows[at + RATE]
-    good = 1
+    good = 1 if e >= -NONE and e <= 1.0 + NONE else 0
     for b in range(size):
         other = (first + b) * GROUPS
         inward -= rows[at + K + b] * x[b]

@@ -68,7 +68,7 @@ class Stop:
     gap : Expr or str
         The distance to the stop, a function of coordinates and time.
     restitution : Expr, number or str
-        Speed after over speed before the impact, from 0 to 1.
+        Speed after over speed before the impact, from 0 to 1.  It may depend on the state before the impact.
     in_order : bool
         What happens if stops that influence each other are hit at the same time, where Newton's law has no unique answer.
         True: they rebound one after another, a node's own stops first, then those of the links in the order of the graph,

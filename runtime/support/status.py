@@ -48,7 +48,8 @@ _MESSAGES = {
     Status.CHATTERING: "a contact, stop or reset changed hundreds of times while no time passed; check friction laws, "
     "restitutions, and that guards are negative after their resets",
     Status.AMBIGUOUS: "at an event several motions agree with the laws of the contacts, or none does: the load of a contact is "
-    "negative, motion leaves a surface on both sides, or stops that feel each other are hit at once (in_order of a Stop); change the model there",
+    "negative, motion leaves a surface on both sides, the restitution of a stop is outside 0 to 1, or stops that feel each other are hit at once "
+    "(in_order of a Stop); change the model there",
     Status.STOPPED: "met the stop condition of the scene before the end of the window",
     Status.PAUSED: "waits for another integrator",
     Status.INTERRUPTED: "stopped by the user before the end; run again with resume",

@@ -117,6 +117,16 @@ def test_a_start_behind_a_stop_is_refused() -> None:
     assert space["begin"](0.0, [0.0, 0.0, 0.0], space["NUMBERS"]) == 0
 
 
+def test_a_restitution_above_one_ends_an_exported_run() -> None:
+    """e = 1 + v**2 at the impact: the run ends as AMBIGUOUS, 1."""
+    ball = sc.Lagrangian(v**2 / 2, y, coordinates={y: v}, initial={y: 0.5}, events=[sc.Stop(y, 1 + v**2)])
+    scene, space = scene_of(ball, None, ALONE, window=2), dict[str, Any]()
+    exec(compile(to_python(scene.equations, scene.parameters), "<export>", "exec"), space)
+    state = start_of(scene)
+    assert space["begin"](0.0, state, space["NUMBERS"]) == 0
+    assert space["run"](0.0, 2.0, state, space["NUMBERS"], 1e-11, 1e-12, None) == 1
+
+
 def test_texts_without_events_say_so() -> None:
     scene = SCENES["neurons"]()
     many = scene.replace(topology=sc.graphs.chain(9))

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 import synchain as sc
 from synchain.models.scenes.file import load_scene
+from synchain.results import Status
 
 X, Y, V, T, TH, OM, G, E = sp.symbols("x y v t th om g e")
 R = sp.Rational
@@ -47,6 +48,17 @@ def test_a_ball_comes_to_rest(integrator: str) -> None:
     e = np.linspace(0.1, 0.9, 8)
     together = end(drop.replace(window=2.0), e=e)
     assert all(np.array_equal(end(drop.replace(window=2.0), e=[each])[0], each_end) for each, each_end in zip(e, together, strict=True))  # fmt: skip
+
+
+@pytest.mark.parametrize("integrator", [*METHODS, "rodas5p"])
+def test_restitution_that_depends_on_the_speed(integrator: str) -> None:
+    """Balls fall to speed 1; e = 1 - c |v|**2 is from 0 to 1 only if 0 <= c <= 1."""
+    c = sp.Symbol("c")
+    ball = sc.Lagrangian(V**2 / 2, Y, coordinates={Y: V}, parameters={c: 0.25}, events=[sc.Stop(Y, 1 - c * V**2)])
+    drop = scene(ball, 1.5, integrator, initial={"y": [0.5]})
+    assert end(drop).ravel() == pytest.approx([0.75 / 2 - 1 / 8, 0.75 - 0.5, 1.0], abs=1e-9)
+    found = sc.run(drop, workers=1, show_progress=False, c=[-0.5, 0.0, 0.9, 1.5])
+    assert [Status(code).name for code in found.status.values] == ["AMBIGUOUS", "FINISHED", "FINISHED", "AMBIGUOUS"]
 
 
 @pytest.mark.parametrize("integrator", METHODS)
