@@ -112,15 +112,19 @@ def _rewritten(e: sp.Expr) -> sp.Expr:
 
 
 def _with_limit(product: sp.Mul) -> sp.Expr:
-    """Write x/sqrt(|x|) as sign(x) sqrt(|x|), and so every product x**k |x|**a with a < 0 < k + a: 0/0 at x = 0."""
+    """Write x/sqrt(|x|) as sign(x) sqrt(|x|), and so every product x**k |x|**a with a < 0 < k + a: 0/0 at x = 0.
+
+    In x |x|**(p - 1) with a parameter p, the numbers in the exponents decide: sign(x) |x|**p.
+    """
     for size in product.args:
         # A factor |x|**degree with degree < 0, and a factor (c x)**k that outweighs it.
         base, degree = size.as_base_exp()
-        if not (isinstance(base, sp.Abs) and degree.is_Rational and degree < 0):
+        lowest = degree.as_coeff_Add()[0]
+        if not (isinstance(base, sp.Abs) and lowest.is_Rational and lowest < 0):
             continue
         for factor in product.args:
             x, k = factor.as_base_exp()
-            ratio = sp.cancel(x / base.args[0]) if k.is_Integer and k + degree > 0 and k > 0 else sp.nan
+            ratio = sp.cancel(x / base.args[0]) if k.is_Integer and k + lowest >= 0 and k + degree != 0 else sp.nan
             if ratio.is_Rational:
                 others = [each for each in product.args if each not in (size, factor)]
                 sign = sp.sign(base.args[0]) if k % 2 else sp.S.One

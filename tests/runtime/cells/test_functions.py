@@ -88,11 +88,19 @@ def test_powers_of_sizes_are_numbers_at_rest(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["v*abs(v)**-0.5", "2*v/sqrt(abs(4*v))", "v**2*abs(v)**(-3/2)*sign(v)", "(v - 0)/sqrt(abs(v))"]
+    "text",
+    [
+        "v*abs(v)**-0.5",
+        "2*v/sqrt(abs(4*v))",
+        "v**2*abs(v)**(-3/2)*sign(v)",
+        "(v - 0)/sqrt(abs(v))",
+        "v*abs(v)**(p - 1)",
+    ],
 )
 def test_quotients_with_a_limit_have_it(text: str) -> None:
     """x/sqrt(|x|) is 0/0 at rest, where sqrt(|x|) sign(x) is 0."""
-    node = sc.Lagrangian("v**2/2", "x**2/2", Q={"x": f"-0.6*{text}"}, coordinates=["x"])
+    p = {"p": 0.5} if "p" in text else {}
+    node = sc.Lagrangian("v**2/2", "x**2/2", Q={"x": f"-0.6*{text}"}, coordinates=["x"], parameters=p)
     settings = {"transient": 0.0, "window": 2.0, "time_unit": "time", "rtol": 1e-10, "integrator": "dop853"}
     result = sc.run(sc.Scene(node, initial={"x": 0.3, "v": 0.0}, **settings), show_progress=False)
 
