@@ -117,11 +117,12 @@ def are_independent(on, size, rows):
 
 
 @njit(error_model="numpy")
-def add_redundant(on, rows, lane, first, size, out, dims):
+def add_redundant(on, notes, lane, first, size, friction):
     """Add to the rows on their surfaces the contacts that cannot slide, as others hold their bodies."""
+    out, dims = friction.out, friction.dims
     if not any_redundant(first, lane, size, out, dims):
         return
-    basis = np.zeros(size, np.bool_)
+    basis, rows = np.zeros(size, np.bool_), gathered(notes, lane, first, size, friction)
     for a in range(size):
         basis[a] = on[a]
         if on[a]:
@@ -134,17 +135,18 @@ def add_redundant(on, rows, lane, first, size, out, dims):
 
 
 @njit(error_model="numpy")
-def share_forces(rows, lane, first, size, out, dims):
+def share_forces(rows, notes, lane, first, size, friction):
     """Set the modes of contacts that cannot slide to the shares of their loads that they carry.
 
     The bodies are held by other rows, whose forces depend linearly on such a share.  The share is in the middle of
     those with which they can hold, so that no rounding error of a speed ends the hold.
     """
+    out, dims = friction.out, friction.dims
     on, modes, low, high = np.zeros(size, np.bool_), np.empty(size), np.empty(size), np.empty(size)
     for a in range(size):
         modes[a] = rows[a * GROUPS + MODE]
         on[a] = modes[a] == 0.0
-    add_redundant(on, rows, lane, first, size, out, dims)
+    add_redundant(on, notes, lane, first, size, friction)
     for a in range(size):
         if not (on[a] and rows[a * GROUPS + ROLE] == OPEN and modes[a] != 0.0):
             continue
@@ -177,9 +179,8 @@ def begin_event(notes, lane, first, size, friction):
     for a in range(size):
         modes[a] = number(MODE, first + a, lane, out, dims)
         resting[a] = modes[a] == 0.0
-    rows = gathered(notes, lane, first, size, friction)
-    forces(modes, x, 0, size, rows)
-    add_redundant(resting, rows, lane, first, size, out, dims)
+    forces(modes, x, 0, size, gathered(notes, lane, first, size, friction))
+    add_redundant(resting, notes, lane, first, size, friction)
     for a in range(size):
         row = first + a
         law, shut = number(LAW, row, lane, out, dims), number(GAP, row, lane, out, dims) <= 0.0
@@ -196,7 +197,7 @@ def begin_event(notes, lane, first, size, friction):
             outcome = 1
         hit[a] = shut and is_stop(row, lane, out, dims) and modes[a] != 0.0
         outcome = 1 if hit[a] else outcome
-    add_redundant(on, rows, lane, first, size, out, dims)
+    add_redundant(on, notes, lane, first, size, friction)
     for a in range(size):
         if on[a] and modes[a] != 0.0:
             notes[first + a, ROLE] = OPEN
@@ -385,7 +386,7 @@ def end_events(lanes, notes, friction):
                 if sets == 0 or (sets > 1 and not several):
                     put(friction.clock, RUSH, lane, math.inf)
                 if several:
-                    share_forces(rows, lane, first, size, out, dims)
+                    share_forces(rows, notes[lane], lane, first, size, friction)
                 for a in range(size):
                     put(out, place(MODE, first + a, dims), lane, rows[a * GROUPS + MODE])
                 project_held(lane, first, size, friction)
@@ -403,8 +404,7 @@ def record_modes(lanes, notes, friction):
             resting = np.zeros(size, np.bool_)
             for a in range(size):
                 resting[a] = number(MODE, first + a, lane, out, dims) == 0.0
-            rows = gathered(notes[lane], lane, first, size, friction)
-            add_redundant(resting, rows, lane, first, size, out, dims)
+            add_redundant(resting, notes[lane], lane, first, size, friction)
             for a in range(size):
                 row = first + a
                 before, after = notes[lane, row, BEFORE], 0.0 if resting[a] else number(MODE, row, lane, out, dims)

@@ -96,9 +96,7 @@ class Row:
     answer: Column  # derivative of x by the rates without rows, for the forces of links
     sets: tuple[tuple[sp.Symbol, sp.Expr], ...] = ()
     in_order: bool = False
-    redundant: bool = (
-        False  # SIGN: a level that vanishes where those of other contacts do, as of two bodies and the ground
-    )
+    redundant: bool = False  # SIGN: a level that vanishes where those of other contacts do (two bodies on the ground)
 
     @property
     def gap(self) -> sp.Expr:
@@ -209,7 +207,7 @@ def rows_of(
         for gradient in gradients
     ]
     redundant = _redundant([surface.level for surface in held if surface.law is Law.SIGN], state)
-    sides = [_side(surface.law, mode, surface.level in redundant) for surface, mode in zip(held, modes, strict=False)]
+    sides = [_side(surface.law, mode, surface.level in redundant) for surface, mode in zip(held, modes, strict=True)]
     x = forces(sides, modes, stiffness, biases)
     # in larger parts the forces of links are among the rates, so that none is added later
     inverse = _inverse(modes, stiffness) if len(held) <= MOST_ROWS else [()] * len(held)
